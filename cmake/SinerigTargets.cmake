@@ -1,0 +1,36 @@
+# Every target of the project is made by one of the three functions below, so that
+# warnings, sanitizers and include paths are stated once.
+
+function(sinerig_options target)
+  target_compile_options(${target} PRIVATE
+    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wold-style-cast
+    $<$<BOOL:${SINERIG_STRICT}>:-Werror>)
+  target_include_directories(${target} PUBLIC "${PROJECT_SOURCE_DIR}/src" "${PROJECT_SOURCE_DIR}")
+  # Bit-identical runs need one rounding rule: no contraction into fused multiply-adds.
+  target_compile_options(${target} PRIVATE -ffp-contract=off)
+  if(SINERIG_SANITIZE)
+    target_compile_options(${target} PUBLIC
+      -fsanitize=${SINERIG_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -O1)
+    target_link_options(${target} PUBLIC -fsanitize=${SINERIG_SANITIZE})
+  endif()
+endfunction()
+
+# sinerig_library(NAME SOURCES a.cpp … LINK libs …)
+function(sinerig_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
+  add_library(${name} STATIC ${arg_SOURCES})
+  sinerig_options(${name})
+  target_link_libraries(${name} PUBLIC ${arg_LINK})
+endfunction()
+
+# sinerig_test(NAME LABEL unit|system|bench SOURCES a.cpp … LINK libs … [ARGS …])
+# One GoogleTest binary, each test case registered under the label.
+function(sinerig_test name)
+  cmake_parse_arguments(arg "" "LABEL" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  sinerig_options(${name})
+  target_link_libraries(${name} PRIVATE ${arg_LINK} GTest::gmock_main)
+  target_compile_definitions(${name} PRIVATE
+    SINERIG_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SINERIG_BINARY="${PROJECT_BINARY_DIR}/sinerig")
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${arg_LABEL} TIMEOUT 600)
+endfunction()

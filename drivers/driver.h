@@ -1,0 +1,57 @@
+// The seam between the loop and everything it can be connected to.
+//
+// Two small interfaces, because "CAN actuator, GPIO encoder" is an ordinary rig; one device may
+// implement both. All calls come from the loop's thread, may not block, allocate or throw.
+#pragma once
+
+#include <cstdint>
+
+namespace sinerig {
+
+// What is wrong with one sample or one command.
+enum class Fault : std::uint8_t {
+  none,     // new, complete, believed
+  stale,    // nothing new since the last read
+  timeout,  // the device did not answer in time
+  bus,      // the transport failed (bus-off, full queue, checksum, exception reply)
+  range,    // the device says that the value left what it can represent
+};
+
+inline constexpr const char* to_string(Fault fault) noexcept {
+  switch (fault) {
+    case Fault::none: return "none";
+    case Fault::stale: return "stale";
+    case Fault::timeout: return "timeout";
+    case Fault::bus: return "bus";
+    case Fault::range: return "range";
+  }
+  return "unknown";
+}
+
+struct Sample {
+  double value = 0.0;        // engineering unit of the channel
+  std::int64_t time_ns = 0;  // when it was acquired (or took effect), in the time base of the clock
+  Fault fault = Fault::none;
+};
+
+class Actuator {
+ public:
+  virtual ~Actuator() = default;
+
+  // Puts `command` (engineering unit) out and returns what was really applied, after clamping,
+  // quantising or sigma-delta, and when. With a fault, `value` is what the device holds instead.
+  virtual Sample write(double command) noexcept = 0;
+
+  // Neutral output. Idempotent, callable from any exit path.
+  virtual void release() noexcept = 0;
+};
+
+class Sensor {
+ public:
+  virtual ~Sensor() = default;
+
+  // The newest value; Fault::stale with the last value when nothing new has arrived.
+  virtual Sample read() noexcept = 0;
+};
+
+}  // namespace sinerig
