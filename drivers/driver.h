@@ -1,10 +1,12 @@
 // The seam between the loop and everything it can be connected to.
 //
 // Two small interfaces, because "CAN actuator, GPIO encoder" is an ordinary rig; one device may
-// implement both. All calls come from the loop's thread, may not block, allocate or throw.
+// implement both. All calls come from the loop's thread and may not block, allocate or throw.
 #pragma once
 
 #include <cstdint>
+
+#include "sweep/nonblocking.h"
 
 namespace sinerig {
 
@@ -40,7 +42,7 @@ class Actuator {
 
   // Puts `command` (engineering unit) out and returns what was really applied, after clamping,
   // quantising or sigma-delta, and when. With a fault, `value` is what the device holds instead.
-  virtual Sample write(double command) noexcept = 0;
+  virtual Sample write(double command) noexcept SINERIG_NONBLOCKING = 0;
 
   // Neutral output. Idempotent, callable from any exit path.
   virtual void release() noexcept = 0;
@@ -51,7 +53,7 @@ class Sensor {
   virtual ~Sensor() = default;
 
   // The newest value; Fault::stale with the last value when nothing new has arrived.
-  virtual Sample read() noexcept = 0;
+  virtual Sample read() noexcept SINERIG_NONBLOCKING = 0;
 };
 
 }  // namespace sinerig

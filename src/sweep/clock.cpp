@@ -1,0 +1,85 @@
+#include "sweep/clock.h"
+
+#include <cerrno>
+#include <cmath>
+#include <ctime>
+#include <stdexcept>
+
+namespace sinerig {
+
+namespace {
+
+constexpr std::int64_t ns_per_s = 1'000'000'000;
+
+std::int64_t monotonic_ns() noexcept {
+  timespec now{};
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<std::int64_t>(now.tv_sec) * ns_per_s + now.tv_nsec;
+}
+
+void sleep_until(std::int64_t time_ns) noexcept {
+  const timespec deadline{.tv_sec = time_ns / ns_per_s, .tv_nsec = time_ns % ns_per_s};
+  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
+  }
+}
+
+}  // namespace
+
+TickGrid::TickGrid(double rate_hz) {
+  if (!(rate_hz >= min_rate_hz) || !(rate_hz <= max_rate_hz)) {
+    throw std::invalid_argument("the loop rate must be between 0.1 Hz and 100 kHz");
+  }
+  const double millihertz = std::round(rate_hz * 1000.0);
+  if (std::abs(millihertz - rate_hz * 1000.0) > 1e-6) {
+    throw std::invalid_argument("the loop rate must be a whole number of millihertz");
+  }
+  constexpr std::uint64_t ns_per_millitick = 1'000'000'000'000;
+  rate_mhz_ = static_cast<std::uint64_t>(millihertz);
+  whole_period_ns_ = ns_per_millitick % rate_mhz_ == 0 ? ns_per_millitick / rate_mhz_ : 0;
+}
+
+std::uint64_t TickGrid::index_at(std::int64_t time_ns) const noexcept {
+  const auto elapsed = static_cast<std::uint64_t>(time_ns);
+  const std::uint64_t seconds = elapsed / ns_per_s;
+  const std::uint64_t rest = elapsed % ns_per_s;
+  // time_ns() rounds down, so the guess can be one tick low.
+  std::uint64_t index = (seconds * rate_mhz_ + rest * rate_mhz_ / ns_per_s) / 1000;
+  while (this->time_ns(index + 1) <= time_ns) ++index;
+  return index;
+}
+
+Tick VirtualClock::wait() noexcept {
+  return {.index = next_++, .lateness = {}};
+}
+
+Instant VirtualClock::now() const noexcept {
+  return {.tick = next_ == 0 ? 0 : next_ - 1, .offset_ns = 0};
+}
+
+std::int64_t VirtualClock::time_ns(Instant instant) const noexcept {
+  return grid().time_ns(instant.tick) + instant.offset_ns;
+}
+
+Tick MonotonicClock::wait() noexcept {
+  if (origin_ns_ == 0) {
+    origin_ns_ = monotonic_ns();
+    return {};
+  }
+  std::uint64_t index = last_ + 1;
+  const std::int64_t deadline_ns = origin_ns_ + grid().time_ns(index);
+  if (monotonic_ns() < deadline_ns) sleep_until(deadline_ns);
+  const std::int64_t elapsed_ns = monotonic_ns() - origin_ns_;
+  if (elapsed_ns >= grid().time_ns(index + 1)) index = grid().index_at(elapsed_ns);
+  last_ = index;
+  return {.index = index, .lateness = std::chrono::nanoseconds{elapsed_ns - grid().time_ns(index)}};
+}
+
+Instant MonotonicClock::now() const noexcept {
+  return {.tick = last_, .offset_ns = monotonic_ns() - origin_ns_ - grid().time_ns(last_)};
+}
+
+std::int64_t MonotonicClock::time_ns(Instant instant) const noexcept {
+  return origin_ns_ + grid().time_ns(instant.tick) + instant.offset_ns;
+}
+
+}  // namespace sinerig

@@ -1,0 +1,47 @@
+// The command of a dwell: its tones on integer phase, under one amplitude envelope. The same
+// phasors drive the output and the correlator.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sweep/nonblocking.h"
+#include "sweep/plan.h"
+#include "sweep/tone.h"
+
+namespace sinerig {
+
+class Excitation {
+ public:
+  explicit Excitation(std::size_t max_tones);
+
+  // Begins a dwell at phase zero; over its ramp the envelope moves from `from_scale` to 1 (a scale
+  // of the dwell's own amplitude, so that the amplitude itself has no step).
+  void start(const Dwell& dwell, double from_scale) noexcept SINERIG_NONBLOCKING;
+
+  // Moves on by `ticks`.
+  void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
+
+  double command() const noexcept SINERIG_NONBLOCKING;
+  std::span<const Phasor> phasors() const noexcept { return phasors_used(); }
+
+ private:
+  struct Voice {
+    PhaseCounter phase;
+    double in_phase = 0.0;    // amplitude · cos(start phase)
+    double quadrature = 0.0;  // amplitude · sin(start phase)
+  };
+
+  std::span<const Phasor> phasors_used() const noexcept { return {phasors_.data(), tones_}; }
+  void refresh() noexcept;
+
+  std::vector<Voice> voices_;
+  std::vector<Phasor> phasors_;
+  std::size_t tones_ = 0;
+  std::uint64_t elapsed_ = 0;
+  std::uint64_t ramp_samples_ = 0;
+  double from_scale_ = 1.0;
+};
+
+}  // namespace sinerig

@@ -1,0 +1,175 @@
+#include "sweep/plan.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+
+namespace sinerig {
+
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+// A dwell longer than this is a mistake in the rig file, not a measurement: 30 days at 1 kHz.
+constexpr double max_dwell_samples = 2.6e9;
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+double log_interpolate(const AmplitudeBreak& low, const AmplitudeBreak& high, double frequency_hz) {
+  const double position =
+      std::log(frequency_hz / low.frequency_hz) / std::log(high.frequency_hz / low.frequency_hz);
+  return low.amplitude * std::pow(high.amplitude / low.amplitude, position);
+}
+
+double table_amplitude(const std::vector<AmplitudeBreak>& table, double frequency_hz) {
+  const auto above = std::find_if(table.begin(), table.end(), [&](const AmplitudeBreak& entry) {
+    return entry.frequency_hz > frequency_hz;
+  });
+  if (above == table.begin()) return table.front().amplitude;
+  if (above == table.end()) return table.back().amplitude;
+  return log_interpolate(*(above - 1), *above, frequency_hz);
+}
+
+// The larger of cycles and seconds, rounded up to whole units of `unit_samples`.
+double whole_units(const Span& span, double samples_per_cycle, double rate_hz,
+                   double unit_samples) {
+  const double samples = std::max(span.cycles * samples_per_cycle, span.seconds * rate_hz);
+  // A span of exactly n units must not become n + 1 by a rounding error.
+  return std::ceil(samples / unit_samples - 1e-9);
+}
+
+void check_band(const std::vector<double>& frequencies_hz, const SweepSettings& sweep,
+                double rate_hz) {
+  const bool listed = sweep.spacing == Spacing::list;
+  for (const double frequency_hz : frequencies_hz) {
+    if (frequency_hz > 0.0 && frequency_hz < rate_hz / 2.0) continue;
+    const char* key =
+        listed ? "frequencies_hz" : (frequency_hz == sweep.start_hz ? "start_hz" : "stop_hz");
+    throw PlanRefused("sweep", key,
+                      number(frequency_hz) + ": must be above 0 and below half the loop rate (" +
+                          number(rate_hz / 2.0) + " Hz)");
+  }
+}
+
+void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double frequency_hz,
+                  double amplitude, double rate_hz) {
+  const double omega_rad_s = two_pi * frequency_hz;
+  const double slew_per_s = 2.0 * amplitude * std::sin(omega_rad_s / rate_hz / 2.0) * rate_hz;
+  const char* amplitude_key = sweep.amplitude_table.empty() ? "amplitude" : "amplitude_table";
+  const auto refuse = [&](const char* what, double value, const char* limit_key, double limit) {
+    throw PlanRefused("sweep", amplitude_key,
+                      std::string{what} + " of " + number(value) + " at " + number(frequency_hz) +
+                          " Hz: exceeds [limits] " + limit_key + " = " + number(limit) +
+                          "; lower the amplitude there or raise the limit");
+  };
+  if (amplitude > limits.command_max) {
+    refuse("a command", amplitude, "command_max", limits.command_max);
+  }
+  if (-amplitude < limits.command_min) {
+    refuse("a command", -amplitude, "command_min", limits.command_min);
+  }
+  if (slew_per_s > limits.slew_per_s) {
+    refuse("a slew", slew_per_s, "slew_per_s", limits.slew_per_s);
+  }
+  if (amplitude * omega_rad_s > limits.velocity_max) {
+    refuse("a peak velocity", amplitude * omega_rad_s, "velocity_max", limits.velocity_max);
+  }
+  if (amplitude * omega_rad_s * omega_rad_s > limits.acceleration_max) {
+    refuse("a peak acceleration", amplitude * omega_rad_s * omega_rad_s, "acceleration_max",
+           limits.acceleration_max);
+  }
+}
+
+Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz) {
+  const CoherentFrequency base = snap(asked_hz, rate_hz, sweep.frequency_tolerance);
+  const auto base_samples = static_cast<double>(base.samples);
+  const double samples_per_cycle = base_samples / static_cast<double>(base.cycles);
+
+  const double bases =
+      std::max(1.0, whole_units(sweep.block, samples_per_cycle, rate_hz, base_samples));
+  const double block_samples = bases * base_samples;
+  const double ramp_samples = std::ceil(sweep.ramp_s * rate_hz - 1e-9);
+  const double settle_blocks = std::ceil(ramp_samples / block_samples) +
+                               whole_units(sweep.settle, samples_per_cycle, rate_hz, block_samples);
+  const double blocks =
+      std::max(1.0, whole_units(sweep.integrate, samples_per_cycle, rate_hz, block_samples));
+  if ((settle_blocks + blocks) * block_samples > max_dwell_samples) {
+    throw PlanRefused("sweep", "integrate_s",
+                      "the dwell at " + number(asked_hz) + " Hz would last " +
+                          number((settle_blocks + blocks) * block_samples / rate_hz) +
+                          " s: shorten settling or integration, or loosen frequency_tolerance");
+  }
+
+  Dwell dwell;
+  dwell.asked_hz = asked_hz;
+  dwell.block_samples = static_cast<std::uint64_t>(block_samples);
+  dwell.ramp_samples = static_cast<std::uint64_t>(ramp_samples);
+  dwell.settle_samples = static_cast<std::uint64_t>(settle_blocks * block_samples);
+  dwell.blocks = static_cast<std::uint32_t>(blocks);
+  dwell.tones = {{.cycles = base.cycles * static_cast<std::uint64_t>(bases)}};
+  dwell.tones.front().amplitude = amplitude_at(sweep, dwell.frequency_hz(rate_hz));
+  return dwell;
+}
+
+bool same_frequency(const Dwell& a, const Dwell& b) {
+  return a.tones.front().cycles * b.block_samples == b.tones.front().cycles * a.block_samples;
+}
+
+}  // namespace
+
+std::uint64_t SweepPlan::samples() const {
+  std::uint64_t sum = 0;
+  for (const Dwell& dwell : dwells) sum += dwell.samples();
+  return sum;
+}
+
+std::vector<double> asked_frequencies(const SweepSettings& sweep) {
+  if (sweep.spacing == Spacing::list) return sweep.frequencies_hz;
+  std::vector<double> frequencies_hz(sweep.points);
+  for (std::uint32_t i = 0; i < sweep.points; ++i) {
+    const double position = sweep.points == 1 ? 0.0 : static_cast<double>(i) / (sweep.points - 1);
+    frequencies_hz[i] = sweep.spacing == Spacing::linear
+                            ? sweep.start_hz + (sweep.stop_hz - sweep.start_hz) * position
+                            : sweep.start_hz * std::pow(sweep.stop_hz / sweep.start_hz, position);
+  }
+  // The ends are what was asked for, not what pow() makes of them.
+  if (sweep.points > 1) frequencies_hz.back() = sweep.stop_hz;
+  return frequencies_hz;
+}
+
+double amplitude_at(const SweepSettings& sweep, double frequency_hz) {
+  const double omega_rad_s = two_pi * frequency_hz;
+  const double wanted = sweep.amplitude_table.empty()
+                            ? sweep.amplitude
+                            : table_amplitude(sweep.amplitude_table, frequency_hz);
+  return std::min({wanted, sweep.follow_velocity / omega_rad_s,
+                   sweep.follow_acceleration / (omega_rad_s * omega_rad_s)});
+}
+
+SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, double rate_hz) {
+  const std::vector<double> frequencies_hz = asked_frequencies(sweep);
+  if (frequencies_hz.empty()) {
+    throw PlanRefused("sweep", "points", "no frequency to measure: give at least one");
+  }
+  check_band(frequencies_hz, sweep, rate_hz);
+
+  SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
+  for (const double asked_hz : frequencies_hz) {
+    Dwell dwell = make_dwell(asked_hz, sweep, rate_hz);
+    const bool duplicate =
+        std::any_of(plan.dwells.begin(), plan.dwells.end(),
+                    [&](const Dwell& other) { return same_frequency(dwell, other); });
+    if (duplicate) continue;
+    check_motion(sweep, limits, dwell.frequency_hz(rate_hz), dwell.tones.front().amplitude,
+                 rate_hz);
+    plan.dwells.push_back(std::move(dwell));
+  }
+  return plan;
+}
+
+}  // namespace sinerig

@@ -1,0 +1,113 @@
+// The sweep as data, before it is motion: every dwell with its exact frequency, amplitude and
+// length, checked against the limits and the rate.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "sweep/tone.h"
+
+namespace sinerig {
+
+enum class Spacing { logarithmic, linear, list };
+
+struct AmplitudeBreak {
+  double frequency_hz;
+  double amplitude;  // unit of the command
+};
+
+inline constexpr double unlimited = std::numeric_limits<double>::infinity();
+
+// A duration asked for in cycles and in seconds; the larger wins.
+struct Span {
+  double cycles = 0.0;
+  double seconds = 0.0;
+};
+
+struct SweepSettings {
+  Spacing spacing = Spacing::logarithmic;
+  double start_hz = 0.0;
+  double stop_hz = 0.0;
+  std::uint32_t points = 0;
+  std::vector<double> frequencies_hz;  // for Spacing::list, in the order to be run
+  double frequency_tolerance = 1e-3;   // relative, for the snap to whole cycles in whole samples
+
+  double amplitude = 0.0;                       // unit of the command
+  std::vector<AmplitudeBreak> amplitude_table;  // log-log interpolation, held beyond its ends
+  double follow_velocity = unlimited;           // A·ω is kept at or below this
+  double follow_acceleration = unlimited;       // A·ω² is kept at or below this
+
+  double ramp_s = 0.0;  // the amplitude moves from that of the last dwell to its own
+  Span settle{.cycles = 4.0, .seconds = 0.5};
+  Span integrate{.cycles = 8.0, .seconds = 0.5};
+  Span block{.cycles = 1.0, .seconds = 0.02};
+};
+
+// What the command may ask of the rig; the plan is refused when a dwell would exceed it.
+struct MotionLimits {
+  double command_min = -unlimited;
+  double command_max = unlimited;
+  double slew_per_s = unlimited;        // |change of the command per tick| · rate
+  double velocity_max = unlimited;      // A·ω
+  double acceleration_max = unlimited;  // A·ω²
+};
+
+struct Tone {
+  std::uint64_t cycles = 0;  // per block
+  double amplitude = 0.0;
+  double phase_rad = 0.0;
+};
+
+// One group of tones held: ramp and settle, then blocks.
+struct Dwell {
+  double asked_hz = 0.0;
+  std::uint64_t block_samples = 1;
+  std::vector<Tone> tones;
+  std::uint64_t ramp_samples = 0;    // at the start of the settling time
+  std::uint64_t settle_samples = 0;  // ramp included; a whole number of blocks
+  std::uint32_t blocks = 0;
+
+  std::uint64_t samples() const { return settle_samples + blocks * block_samples; }
+  double tone_hz(const Tone& tone, double rate_hz) const {
+    return rate_hz * static_cast<double>(tone.cycles) / static_cast<double>(block_samples);
+  }
+  double frequency_hz(double rate_hz) const { return tone_hz(tones.front(), rate_hz); }
+};
+
+struct SweepPlan {
+  double rate_hz = 0.0;
+  std::vector<Dwell> dwells;
+
+  std::uint64_t samples() const;
+  double seconds() const { return static_cast<double>(samples()) / rate_hz; }
+};
+
+// A plan that can't be run: the message says what, `section` and `key` say which entry of the rig
+// file to change.
+class PlanRefused : public std::invalid_argument {
+ public:
+  PlanRefused(std::string section, std::string key, const std::string& what)
+      : std::invalid_argument{what}, section_{std::move(section)}, key_{std::move(key)} {}
+  const std::string& section() const { return section_; }
+  const std::string& key() const { return key_; }
+
+ private:
+  std::string section_;
+  std::string key_;
+};
+
+// The frequencies asked for, in Hz and in running order.
+std::vector<double> asked_frequencies(const SweepSettings& sweep);
+
+// The amplitude at a frequency: the constant or the table, held under the velocity and acceleration
+// that it is to follow.
+double amplitude_at(const SweepSettings& sweep, double frequency_hz);
+
+// Snaps, merges duplicates, sizes every dwell and checks it against the limits.
+// Throws PlanRefused before anything moves.
+SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, double rate_hz);
+
+}  // namespace sinerig

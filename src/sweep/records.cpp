@@ -1,0 +1,44 @@
+#include "sweep/records.h"
+
+namespace sinerig {
+
+const char* to_string(PointStatus status) noexcept {
+  switch (status) {
+    case PointStatus::good: return "good";
+    case PointStatus::unsettled: return "unsettled";
+    case PointStatus::low_signal: return "low_signal";
+    case PointStatus::clipped: return "clipped";
+    case PointStatus::distorted: return "distorted";
+    case PointStatus::rt_fault: return "rt_fault";
+    case PointStatus::stopped: return "stopped";
+  }
+  return "unknown";
+}
+
+const char* to_string(PointReason reason) noexcept {
+  switch (reason) {
+    case PointReason::none: return "";
+    case PointReason::no_excitation: return "no_excitation";
+    case PointReason::output_at_range: return "output_at_range";
+    case PointReason::gaps: return "gaps";
+    case PointReason::guard_trip: return "guard_trip";
+  }
+  return "unknown";
+}
+
+const char* to_string(EventKind kind) noexcept {
+  switch (kind) {
+    case EventKind::started: return "started";
+    case EventKind::dwell_began: return "dwell_began";
+    case EventKind::gap: return "gap";
+    case EventKind::actuator_fault: return "actuator_fault";
+    case EventKind::sensor_fault: return "sensor_fault";
+    case EventKind::sensor_recovered: return "sensor_recovered";
+    case EventKind::tripped: return "tripped";
+    case EventKind::released: return "released";
+    case EventKind::finished: return "finished";
+  }
+  return "unknown";
+}
+
+}  // namespace sinerig

@@ -1,0 +1,137 @@
+// What leaves the loop: plain values, copied through the outbox to whoever records them.
+#pragma once
+
+#include <array>
+#include <complex>
+#include <cstdint>
+#include <type_traits>
+#include <variant>
+
+#include "drivers/driver.h"
+#include "sweep/correlator.h"
+#include "sweep/estimator.h"
+#include "sweep/guard.h"
+
+namespace sinerig {
+
+// Channels of one run: 0 is the command, 1 what was applied, 2… the sensors in order.
+inline constexpr std::size_t command_channel = 0;
+inline constexpr std::size_t applied_channel = 1;
+inline constexpr std::size_t first_sensor_channel = 2;
+inline constexpr std::size_t max_channels = 16;
+
+enum class PointStatus : std::uint8_t {
+  good,
+  unsettled,
+  low_signal,
+  clipped,
+  distorted,
+  rt_fault,
+  stopped,
+};
+
+const char* to_string(PointStatus status) noexcept;
+
+// Why a point has its status; the number that goes with it is Point::reason_value.
+enum class PointReason : std::uint8_t {
+  none,
+  no_excitation,    // the applied signal does not hold the tone: |U| relative to the command
+  output_at_range,  // fraction of samples with Fault::range
+  gaps,             // times the dwell had to settle again
+  guard_trip,       // see the event of the same tick
+};
+
+const char* to_string(PointReason reason) noexcept;
+
+// The result of a dwell for one tone and one pair of channels.
+struct Point {
+  std::uint32_t dwell = 0;
+  std::uint16_t tone = 0;
+  std::uint16_t input = applied_channel;
+  std::uint16_t output = first_sensor_channel;
+  PointStatus status = PointStatus::good;
+  PointReason reason = PointReason::none;
+  double reason_value = 0.0;
+  double frequency_hz = 0.0;
+  std::complex<double> response{};
+  Covariance2 covariance{};
+  double input_amplitude = 0.0;   // of the applied signal, unit of the command
+  double output_amplitude = 0.0;  // unit of the output channel
+  std::uint32_t blocks = 0;
+};
+
+// Per-block coefficients of one channel at one tone.
+struct Block {
+  std::uint32_t dwell = 0;
+  std::uint32_t block = 0;
+  std::uint16_t tone = 0;
+  std::uint16_t channel = 0;
+  std::uint64_t first_tick = 0;
+  Coefficients coefficients{};
+};
+
+// The loop's timing in one dwell.
+struct DwellTiming {
+  static constexpr std::size_t bins = 24;
+
+  std::uint32_t dwell = 0;
+  std::uint64_t first_tick = 0;
+  std::uint64_t ticks = 0;    // executed
+  std::uint64_t skipped = 0;  // not executed
+  std::uint32_t voided_blocks = 0;
+  std::uint32_t resettles = 0;
+  std::int64_t max_lateness_ns = 0;
+  std::array<std::uint32_t, bins>
+      lateness{};  // bin k counts lateness in [2^(k−1), 2^k) µs, bin 0 below 1 µs
+};
+
+enum class EventKind : std::uint8_t {
+  started,
+  dwell_began,
+  gap,             // value: ticks skipped
+  actuator_fault,  // detail: Fault
+  sensor_fault,    // channel, detail: Fault; the first of a run of them
+  sensor_recovered,
+  tripped,  // see trip
+  released,
+  finished,
+};
+
+const char* to_string(EventKind kind) noexcept;
+
+struct Event {
+  EventKind kind = EventKind::started;
+  Fault fault = Fault::none;
+  std::uint16_t channel = 0;
+  std::uint32_t dwell = 0;
+  std::uint64_t tick = 0;
+  double value = 0.0;
+  Trip trip{};
+};
+
+// One tick of every channel; only when the rig file asks for samples.
+struct TickSamples {
+  std::uint64_t tick = 0;
+  std::uint32_t dwell = 0;
+  std::uint32_t channels = 0;
+  std::array<double, max_channels> values{};
+};
+
+using Record = std::variant<Point, Block, DwellTiming, Event, TickSamples>;
+static_assert(std::is_trivially_copyable_v<Record>);
+
+// Where the loop hands its records. Called from the loop's thread; may not wait or allocate.
+class RecordSink {
+ public:
+  virtual ~RecordSink() = default;
+
+  virtual void put(const Record& record) noexcept SINERIG_NONBLOCKING = 0;
+
+  // May be dropped under load, and then is counted.
+  virtual void put_sample(const TickSamples& samples) noexcept SINERIG_NONBLOCKING = 0;
+
+  // Once a tick. False when records can no longer be taken: the loop has to stop.
+  virtual bool flush() noexcept SINERIG_NONBLOCKING = 0;
+};
+
+}  // namespace sinerig

@@ -1,0 +1,28 @@
+// Keeps everything that leaves the loop, for tests to look at.
+#pragma once
+
+#include <vector>
+
+#include "sweep/records.h"
+
+namespace sinerig::test {
+
+class CollectingSink final : public RecordSink {
+ public:
+  void put(const Record& record) noexcept override {
+    if (const auto* point = std::get_if<Point>(&record)) points.push_back(*point);
+    if (const auto* block = std::get_if<Block>(&record)) blocks.push_back(*block);
+    if (const auto* timing = std::get_if<DwellTiming>(&record)) timings.push_back(*timing);
+    if (const auto* event = std::get_if<Event>(&record)) events.push_back(*event);
+  }
+  void put_sample(const TickSamples& tick) noexcept override { samples.push_back(tick); }
+  bool flush() noexcept override { return true; }
+
+  std::vector<Point> points;
+  std::vector<Block> blocks;
+  std::vector<DwellTiming> timings;
+  std::vector<Event> events;
+  std::vector<TickSamples> samples;
+};
+
+}  // namespace sinerig::test
