@@ -38,7 +38,7 @@ Outbox::Outbox(std::size_t capacity, std::size_t backlog, WhenFull when_full)
       backlog_(std::max<std::size_t>(backlog, 1)) {}
 
 void Outbox::push_waiting(const Record& record) noexcept {
-  while (!queue_.try_push(record)) std::this_thread::yield();
+  while (!queue_.try_push(record) && !abandoned()) std::this_thread::yield();
 }
 
 void Outbox::put(const Record& record) noexcept {
@@ -67,11 +67,11 @@ bool Outbox::flush() noexcept {
     backlog_first_ = (backlog_first_ + 1) % backlog_.size();
     --backlog_count_;
   }
-  return backlog_count_ <= backlog_.size() / 2;
+  return backlog_count_ <= backlog_.size() / 2 && !abandoned();
 }
 
 void Outbox::close() noexcept {
-  while (backlog_count_ > 0) {
+  while (backlog_count_ > 0 && !abandoned()) {
     flush();
     std::this_thread::yield();
   }

@@ -51,7 +51,11 @@ class Outbox final : public RecordSink {
   bool try_take(Record& record) noexcept { return queue_.try_pop(record); }
   bool closed() const noexcept { return closed_.load(std::memory_order_acquire); }
 
+  // The consumer gives up: the loop is told to stop and nobody waits any more.
+  void abandon() noexcept { abandoned_.store(true, std::memory_order_release); }
+
  private:
+  bool abandoned() const noexcept { return abandoned_.load(std::memory_order_acquire); }
   void push_waiting(const Record& record) noexcept;
 
   RecordQueue queue_;
@@ -62,6 +66,7 @@ class Outbox final : public RecordSink {
   std::size_t backlog_count_ = 0;
   std::uint64_t dropped_samples_ = 0;
   std::atomic<bool> closed_{false};
+  std::atomic<bool> abandoned_{false};
 };
 
 }  // namespace sinerig

@@ -67,11 +67,11 @@ void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double
                           " Hz: exceeds [limits] " + limit_key + " = " + number(limit) +
                           "; lower the amplitude there or raise the limit");
   };
-  if (amplitude > limits.command_max) {
-    refuse("a command", amplitude, "command_max", limits.command_max);
+  if (sweep.offset + amplitude > limits.command_max) {
+    refuse("a command", sweep.offset + amplitude, "command_max", limits.command_max);
   }
-  if (-amplitude < limits.command_min) {
-    refuse("a command", -amplitude, "command_min", limits.command_min);
+  if (sweep.offset - amplitude < limits.command_min) {
+    refuse("a command", sweep.offset - amplitude, "command_min", limits.command_min);
   }
   if (slew_per_s > limits.slew_per_s) {
     refuse("a slew", slew_per_s, "slew_per_s", limits.slew_per_s);
@@ -158,7 +158,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   }
   check_band(frequencies_hz, sweep, rate_hz);
 
-  SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
+  SweepPlan plan{.rate_hz = rate_hz, .offset = sweep.offset, .dwells = {}};
   for (const double asked_hz : frequencies_hz) {
     Dwell dwell = make_dwell(asked_hz, sweep, rate_hz);
     const bool duplicate =

@@ -35,6 +35,7 @@ struct SweepSettings {
   std::vector<double> frequencies_hz;  // for Spacing::list, in the order to be run
   double frequency_tolerance = 1e-3;   // relative, for the snap to whole cycles in whole samples
 
+  double offset = 0.0;                          // the command that the sines are laid on
   double amplitude = 0.0;                       // unit of the command
   std::vector<AmplitudeBreak> amplitude_table;  // log-log interpolation, held beyond its ends
   double follow_velocity = unlimited;           // A·ω is kept at or below this
@@ -79,6 +80,7 @@ struct Dwell {
 
 struct SweepPlan {
   double rate_hz = 0.0;
+  double offset = 0.0;  // the command that the tones are laid on
   std::vector<Dwell> dwells;
 
   std::uint64_t samples() const;

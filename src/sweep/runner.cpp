@@ -88,7 +88,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (stop_requests > 0) {
     guard_.stop(TripCause::stop_requested, tick.index, stop_requests > 1);
   }
-  exchange(guard_.admit(excitation_.command(), tick.index, ticks), tick.index);
+  exchange(guard_.admit(plan_.offset + excitation_.command(), tick.index, ticks), tick.index);
   control.tick.store(tick.index, std::memory_order_relaxed);
   control.dwell.store(dwell_, std::memory_order_relaxed);
 

@@ -1,0 +1,44 @@
+// A driver as the composition root sees it: it reads its own keys of the rig file, and opens later.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/rig.h"
+#include "drivers/driver.h"
+#include "sweep/clock.h"
+
+namespace sinerig {
+
+// The channels of one rig that one driver serves. Configured without touching anything, so that a
+// rig file can be checked and planned anywhere.
+class Device {
+ public:
+  virtual ~Device() = default;
+
+  // Acquires the hardware; throws std::runtime_error saying what failed and what to do. `clock`
+  // outlives the device. The destructor leaves the actuator neutral.
+  virtual void open(const Clock& clock) = 0;
+
+  // Valid after open(). Null where the device has no actuator.
+  virtual Actuator* actuator() noexcept = 0;
+  virtual Sensor& sensor(std::size_t index) noexcept = 0;
+};
+
+// What a driver is asked to serve: pointers into the rig, which outlives the call.
+struct DeviceRequest {
+  const config::Rig& rig;
+  const config::Channel* actuator = nullptr;
+  std::vector<const config::Channel*> sensors;
+};
+
+struct DriverKit {
+  std::string name;     // of `driver = "…"` in the rig file
+  std::string summary;  // one line for `sinerig drivers`
+  std::function<std::unique_ptr<Device>(const DeviceRequest&)> configure;
+};
+
+}  // namespace sinerig

@@ -1,0 +1,190 @@
+#include "sim/sim_driver.h"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+namespace sinerig::sim {
+
+namespace {
+
+using config::above_zero;
+using config::any_number;
+using config::ConfigError;
+using config::fraction_of_one;
+using config::Section;
+using config::zero_or_more;
+
+MechanicalAxis read_axis(const Section& plant) {
+  MechanicalAxis axis;
+  axis.inertia = plant.number("inertia", above_zero);
+  axis.damping = plant.number("damping", zero_or_more, axis.damping);
+  axis.stiffness = plant.number("stiffness", zero_or_more, axis.stiffness);
+  axis.gain = plant.number("gain", any_number, axis.gain);
+  axis.lag_hz = plant.number("lag_hz", zero_or_more, axis.lag_hz);
+  for (const Section& mode : plant.tables("modes")) {
+    axis.modes.push_back({.frequency_hz = mode.number("frequency_hz", above_zero),
+                          .damping = mode.number("damping", {.min = 0.0, .max = 10.0}),
+                          .residue = mode.number("residue", any_number)});
+  }
+  return axis;
+}
+
+Eigen::MatrixXd read_matrix(const Section& plant, std::string_view key) {
+  const auto rows = plant.rows(key, any_number);
+  const std::size_t columns = rows.empty() ? 0 : rows.front().size();
+  Eigen::MatrixXd matrix(static_cast<Eigen::Index>(rows.size()),
+                         static_cast<Eigen::Index>(columns));
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (rows[i].size() != columns) plant.refuse(key, "every row must have the same length");
+    for (std::size_t j = 0; j < columns; ++j) {
+      matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) = rows[i][j];
+    }
+  }
+  return matrix;
+}
+
+Eigen::VectorXd read_vector(const Section& plant, std::string_view key) {
+  const std::vector<double> numbers = plant.numbers(key, any_number);
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(),
+                                           static_cast<Eigen::Index>(numbers.size()));
+}
+
+// The builders' refusals, put at the key they are about.
+template <typename Build>
+LinearSystem built_at(const Section& plant, std::string_view key, Build build) {
+  try {
+    return build();
+  } catch (const std::invalid_argument& refused) {
+    plant.refuse(key, refused.what());
+  }
+}
+
+LinearSystem read_system(const Section& plant) {
+  const std::string kind =
+      plant.choice("kind", {"mechanical", "transfer_function", "zeros_poles", "state_space"});
+  if (kind == "transfer_function") {
+    const auto num = plant.numbers("num", any_number);
+    const auto den = plant.numbers("den", any_number);
+    return built_at(plant, "den", [&] { return from_transfer_function(num, den); });
+  }
+  if (kind == "zeros_poles") {
+    const double gain = plant.number("gain", any_number);
+    const auto zeros = plant.roots("zeros");
+    const auto poles = plant.roots("poles");
+    return built_at(plant, "zeros", [&] { return from_zeros_poles(zeros, poles, gain); });
+  }
+  if (kind == "state_space") {
+    const auto names = plant.texts("outputs");
+    const Eigen::MatrixXd a = read_matrix(plant, "a");
+    const Eigen::MatrixXd c = read_matrix(plant, "c");
+    const Eigen::VectorXd b = read_vector(plant, "b");
+    const Eigen::VectorXd d =
+        plant.has("d") ? read_vector(plant, "d") : Eigen::VectorXd::Zero(c.rows());
+    return built_at(plant, "a", [&] { return from_state_space(a, b, c, d, names); });
+  }
+  return from_mechanical_axis(read_axis(plant));
+}
+
+Friction read_friction(const Section& plant, const LinearSystem& system) {
+  Friction friction;
+  friction.coulomb = plant.number("coulomb_friction", zero_or_more, friction.coulomb);
+  friction.breakaway = plant.number("breakaway_friction", zero_or_more, friction.breakaway);
+  friction.stribeck_velocity =
+      plant.number("stribeck_velocity", above_zero, friction.stribeck_velocity);
+  if (friction.present() && system.velocity.size() == 0) {
+    plant.refuse(friction.coulomb > 0.0 ? "coulomb_friction" : "breakaway_friction",
+                 "friction needs kind = \"mechanical\", which has a velocity for it to act on");
+  }
+  return friction;
+}
+
+ActuatorImperfections read_actuator(const Section& section) {
+  ActuatorImperfections actuator;
+  actuator.min = section.number("clamp_min", any_number, actuator.min);
+  actuator.max = section.number("clamp_max", any_number, actuator.max);
+  if (!(actuator.min < actuator.max)) section.refuse("clamp_min", "must be below clamp_max");
+  actuator.quantum = section.number("quantum", zero_or_more, actuator.quantum);
+  actuator.slew_per_s = section.number("slew_limit_per_s", above_zero, actuator.slew_per_s);
+  actuator.dropout_fraction =
+      section.number("dropout_fraction", fraction_of_one, actuator.dropout_fraction);
+  return actuator;
+}
+
+SimulatedSensor read_sensor(const Section& section, const LinearSystem& system, double period_s) {
+  SimulatedSensor sensor;
+  const std::string output = section.text("output", system.outputs.front());
+  const auto found = std::find(system.outputs.begin(), system.outputs.end(), output);
+  if (found == system.outputs.end()) {
+    std::string names;
+    for (const std::string& name : system.outputs) names += " \"" + name + "\"";
+    section.refuse("output", "the plant has no such output; it has" + names);
+  }
+  sensor.output = static_cast<std::size_t>(found - system.outputs.begin());
+
+  SensorImperfections& wrong = sensor.imperfections;
+  wrong.delay_s = section.number("delay_s", {.min = 0.0, .max = 10.0}, wrong.delay_s);
+  wrong.jitter_s =
+      section.number("jitter_s", {.min = 0.0, .max = period_s, .open_max = true}, wrong.jitter_s);
+  wrong.noise_rms = section.number("noise_rms", zero_or_more, wrong.noise_rms);
+  wrong.pink_noise_rms = section.number("pink_noise_rms", zero_or_more, wrong.pink_noise_rms);
+  wrong.bias = section.number("bias", any_number, wrong.bias);
+  wrong.drift_per_s = section.number("drift_per_s", any_number, wrong.drift_per_s);
+  wrong.backlash = section.number("backlash", zero_or_more, wrong.backlash);
+  wrong.quantum = section.number("quantum", zero_or_more, wrong.quantum);
+  wrong.min = section.number("clip_min", any_number, wrong.min);
+  wrong.max = section.number("clip_max", any_number, wrong.max);
+  if (!(wrong.min < wrong.max)) section.refuse("clip_min", "must be below clip_max");
+  wrong.lost_fraction = section.number("lost_fraction", fraction_of_one, wrong.lost_fraction);
+  wrong.late_fraction = section.number("late_fraction", fraction_of_one, wrong.late_fraction);
+  wrong.stuck_at_s = section.number("stuck_at_s", zero_or_more, wrong.stuck_at_s);
+  return sensor;
+}
+
+class SimDevice final : public Device {
+ public:
+  explicit SimDevice(SimulatedRigSettings settings) : settings_{std::move(settings)} {}
+
+  void open(const Clock& clock) override { rig_.emplace(settings_, clock); }
+  Actuator* actuator() noexcept override { return &rig_->actuator(); }
+  Sensor& sensor(std::size_t index) noexcept override { return rig_->sensor(index); }
+
+ private:
+  SimulatedRigSettings settings_;
+  std::optional<SimulatedRig> rig_;
+};
+
+std::unique_ptr<Device> configure(const DeviceRequest& request) {
+  if (request.actuator == nullptr) {
+    request.sensors.front()->section.refuse(
+        "driver", "a simulated sensor needs the simulated plant: [actuator] driver = \"sim\"");
+  }
+  const Section plant = request.rig.file->section("plant");
+  SimulatedRigSettings settings;
+  settings.system = read_plant(plant);
+  settings.friction = read_friction(plant, settings.system);
+  settings.seed = static_cast<std::uint64_t>(
+      plant.integer("seed", {.min = 0.0, .max = 9e15}, static_cast<std::int64_t>(settings.seed)));
+  settings.actuator = read_actuator(request.actuator->section);
+  settings.neutral = request.rig.guard.neutral;
+  for (const config::Channel* sensor : request.sensors) {
+    settings.sensors.push_back(
+        read_sensor(sensor->section, settings.system, 1.0 / request.rig.rate_hz));
+  }
+  return std::make_unique<SimDevice>(std::move(settings));
+}
+
+}  // namespace
+
+LinearSystem read_plant(const config::Section& plant) {
+  LinearSystem system = read_system(plant);
+  system.dead_time_s = plant.number("delay_s", {.min = 0.0, .max = 10.0}, 0.0);
+  return system;
+}
+
+DriverKit sim_driver() {
+  return {
+      .name = "sim", .summary = "simulated plant in this process, [plant]", .configure = configure};
+}
+
+}  // namespace sinerig::sim

@@ -1,0 +1,109 @@
+#include "cli/app.h"
+
+#include <CLI/CLI.hpp>
+#include <spdlog/cfg/env.h>
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include "cli/commands.h"
+#include "config/section.h"
+#include "record/database.h"
+#include "version.h"
+
+namespace sinerig::cli {
+
+namespace {
+
+constexpr const char* description =
+    "Measures the frequency response of a gimbal, servo or actuator with stepped sines, in real\n"
+    "time, over the bus it already has; or of a simulated plant, in no time.\n"
+    "\n"
+    "  sinerig plan config/gimbal.toml     what would be run, and for how long; nothing moves\n"
+    "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep\n"
+    "  sinerig show gimbal.sweep           the points of a run\n"
+    "  sinerig export gimbal.sweep --format csv -o gimbal.csv";
+
+constexpr const char* footer =
+    "Exit codes: 0 done, 1 failed, 2 usage or configuration, 3 stopped by a limit or a fault,\n"
+    "4 interrupted. Every key of a rig file is explained in the files of config/.";
+
+void set_up_logging(const std::string& level) {
+  spdlog::set_default_logger(spdlog::stderr_color_mt("sinerig"));
+  spdlog::set_pattern("%^%l%$: %v");
+  spdlog::cfg::load_env_levels();
+  if (!level.empty()) spdlog::set_level(spdlog::level::from_str(level));
+}
+
+}  // namespace
+
+int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
+  CLI::App app{description, "sinerig"};
+  app.footer(footer);
+  app.set_version_flag("--version", std::string{"sinerig "} + version);
+  app.require_subcommand(1);
+  app.fallthrough();
+  std::string log_level;
+  app.add_option("--log-level", log_level,
+                 "trace, debug, info, warn, error or off (also: SPDLOG_LEVEL)")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
+
+  std::string rig;
+  std::string file;
+  RunOptions run_options;
+  ExportOptions export_options;
+
+  CLI::App* plan = app.add_subcommand(
+      "plan", "Print every dwell of a rig file and the total duration; refuse what can't be run");
+  plan->add_option("RIG", rig, "rig file (TOML)")->required();
+
+  CLI::App* run = app.add_subcommand("run", "Run the sweep of a rig file and write a sweep file");
+  run->add_option("RIG", run_options.rig, "rig file (TOML)")->required();
+  run->add_option(
+      "-o,--output", run_options.output,
+      "sweep file to write (default: RIG's name + .sweep, here; numbered when it exists)");
+  run->add_flag("--force", run_options.force, "replace the sweep file if it exists");
+
+  CLI::App* show =
+      app.add_subcommand("show", "Print a sweep file: how the run went and its points");
+  show->add_option("FILE", file, "sweep file")->required();
+
+  CLI::App* exporter = app.add_subcommand("export", "Write a sweep file's response as CSV or JSON");
+  exporter->add_option("FILE", export_options.file, "sweep file")->required();
+  exporter->add_option("--format", export_options.format, "csv or json")
+      ->check(CLI::IsMember({"csv", "json"}))
+      ->capture_default_str();
+  exporter->add_option("-o,--output", export_options.output,
+                       "file to write (default: standard output)");
+  exporter->add_option("--channel", export_options.channel,
+                       "sensor whose response the CSV holds (default: the first)");
+  exporter->add_flag("--force", export_options.force, "replace the file if it exists");
+
+  CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? exit_done : exit_usage;
+  }
+  set_up_logging(log_level);
+
+  try {
+    if (plan->parsed()) return plan_command(rig, drivers);
+    if (run->parsed()) return run_command(run_options, drivers);
+    if (show->parsed()) return show_command(file);
+    if (exporter->parsed()) return export_command(export_options);
+    if (list->parsed()) return drivers_command(drivers);
+  } catch (const config::ConfigError& error) {
+    spdlog::error("{}", error.what());
+    return exit_usage;
+  } catch (const record::FileExists& error) {
+    spdlog::error("{}", error.what());
+    return exit_usage;
+  } catch (const std::exception& error) {
+    spdlog::error("{}", error.what());
+    return exit_failed;
+  }
+  return exit_usage;
+}
+
+}  // namespace sinerig::cli

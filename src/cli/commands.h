@@ -1,0 +1,39 @@
+// The commands of the program, one function each. They throw; main catches.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "drivers/device.h"
+
+namespace sinerig::cli {
+
+enum ExitCode : int {
+  exit_done = 0,
+  exit_failed = 1,
+  exit_usage = 2,        // usage or configuration
+  exit_stopped = 3,      // by a limit or a fault
+  exit_interrupted = 4,  // by the user; resumable
+};
+
+struct RunOptions {
+  std::string rig;
+  std::string output;  // empty: NAME.sweep of the rig file, numbered when it exists
+  bool force = false;
+};
+
+struct ExportOptions {
+  std::string file;
+  std::string format = "csv";
+  std::string output;   // empty: standard output
+  std::string channel;  // of the CSV; empty: the first sensor
+  bool force = false;
+};
+
+int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
+int plan_command(const std::string& rig, const std::vector<DriverKit>& drivers);
+int show_command(const std::string& file);
+int export_command(const ExportOptions& options);
+int drivers_command(const std::vector<DriverKit>& drivers);
+
+}  // namespace sinerig::cli

@@ -1,0 +1,61 @@
+#include "cli/configured_rig.h"
+
+#include <algorithm>
+
+namespace sinerig::cli {
+
+namespace {
+
+const DriverKit& driver_of(const config::Channel& channel, const std::vector<DriverKit>& drivers) {
+  const auto found = std::find_if(drivers.begin(), drivers.end(), [&](const DriverKit& driver) {
+    return driver.name == channel.driver;
+  });
+  if (found != drivers.end()) return *found;
+  std::string names;
+  for (const DriverKit& driver : drivers) names += " \"" + driver.name + "\"";
+  channel.section.refuse("driver", "this build has no such driver; it has" + names);
+}
+
+std::unique_ptr<Clock> make_clock(const config::Rig& rig) {
+  const TickGrid grid{rig.rate_hz};
+  if (rig.clock == config::ClockKind::virtual_time) return std::make_unique<VirtualClock>(grid);
+  return std::make_unique<MonotonicClock>(grid);
+}
+
+}  // namespace
+
+ConfiguredRig::ConfiguredRig(const std::string& path, const std::vector<DriverKit>& drivers)
+    : rig_{config::read_rig(config::RigFile::load(path))}, clock_{make_clock(rig_)} {
+  driver_of(rig_.actuator, drivers);
+  for (const config::Channel& sensor : rig_.sensors) driver_of(sensor, drivers);
+  for (const DriverKit& driver : drivers) {
+    DeviceRequest request{.rig = rig_, .actuator = nullptr, .sensors = {}};
+    Part part;
+    if (rig_.actuator.driver == driver.name) {
+      request.actuator = &rig_.actuator;
+      part.actuates = true;
+    }
+    for (std::size_t i = 0; i < rig_.sensors.size(); ++i) {
+      if (rig_.sensors[i].driver != driver.name) continue;
+      request.sensors.push_back(&rig_.sensors[i]);
+      part.sensors.push_back(i);
+    }
+    if (!part.actuates && part.sensors.empty()) continue;
+    part.device = driver.configure(request);
+    parts_.push_back(std::move(part));
+  }
+  rig_.file->refuse_unread();
+}
+
+void ConfiguredRig::open() {
+  sensors_.resize(rig_.sensors.size());
+  for (Part& part : parts_) {
+    part.device->open(*clock_);
+    if (part.actuates) actuator_ = part.device->actuator();
+    for (std::size_t i = 0; i < part.sensors.size(); ++i) {
+      sensors_[part.sensors[i]] = &part.device->sensor(i);
+    }
+  }
+}
+
+}  // namespace sinerig::cli

@@ -1,0 +1,42 @@
+// A rig file with the drivers that serve it, checked to the last key and not yet open.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "config/rig.h"
+#include "drivers/device.h"
+#include "sweep/clock.h"
+
+namespace sinerig::cli {
+
+class ConfiguredRig {
+ public:
+  // Reads the file, lets each driver read its keys, refuses every key that nobody knows.
+  // Throws config::ConfigError.
+  ConfiguredRig(const std::string& path, const std::vector<DriverKit>& drivers);
+
+  const config::Rig& rig() const { return rig_; }
+  Clock& clock() { return *clock_; }
+
+  // Acquires the hardware; the accessors below are valid from here on.
+  void open();
+  Actuator& actuator() { return *actuator_; }
+  const std::vector<Sensor*>& sensors() const { return sensors_; }
+
+ private:
+  struct Part {
+    std::unique_ptr<Device> device;
+    bool actuates = false;
+    std::vector<std::size_t> sensors;  // index in the rig of each sensor that the device serves
+  };
+
+  config::Rig rig_;
+  std::unique_ptr<Clock> clock_;  // outlives the devices
+  std::vector<Part> parts_;
+  Actuator* actuator_ = nullptr;
+  std::vector<Sensor*> sensors_;
+};
+
+}  // namespace sinerig::cli

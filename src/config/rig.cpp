@@ -1,0 +1,198 @@
+#include "config/rig.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "sweep/clock.h"
+#include "sweep/records.h"
+
+namespace sinerig::config {
+
+namespace {
+
+double read_rate(const Section& loop) {
+  const double rate_hz =
+      loop.number("rate_hz", {.min = TickGrid::min_rate_hz, .max = TickGrid::max_rate_hz});
+  if (std::abs(rate_hz * 1000.0 - std::round(rate_hz * 1000.0)) > 1e-6) {
+    loop.refuse("rate_hz", "must be a whole number of millihertz");
+  }
+  return rate_hz;
+}
+
+ClockKind read_clock(const Section& loop, bool simulated) {
+  if (!loop.has("clock")) return simulated ? ClockKind::virtual_time : ClockKind::monotonic;
+  const std::string name = loop.choice("clock", {"virtual", "monotonic"});
+  if (name == "virtual" && !simulated) {
+    loop.refuse("clock", "needs every driver to be \"sim\"; hardware runs on \"monotonic\"");
+  }
+  return name == "virtual" ? ClockKind::virtual_time : ClockKind::monotonic;
+}
+
+Range below_half(double rate_hz) {
+  return {.min = 0.0, .max = rate_hz / 2.0, .open_min = true, .open_max = true};
+}
+
+double read_frequency(const Section& sweep, std::string_view key, double rate_hz) {
+  const double frequency_hz = sweep.number(key, above_zero);
+  if (!below_half(rate_hz).contains(frequency_hz)) {
+    sweep.refuse(key, "must be below half the loop rate (" +
+                          std::to_string(static_cast<long>(rate_hz / 2.0)) + " Hz)");
+  }
+  return frequency_hz;
+}
+
+void read_frequencies(const Section& section, double rate_hz, SweepSettings& sweep) {
+  const std::string spacing = section.choice("spacing", {"logarithmic", "linear", "list"});
+  if (spacing == "list") {
+    sweep.spacing = Spacing::list;
+    sweep.frequencies_hz = section.numbers("frequencies_hz", below_half(rate_hz));
+    if (sweep.frequencies_hz.empty()) section.refuse("frequencies_hz", "must hold at least one");
+    return;
+  }
+  sweep.spacing = spacing == "linear" ? Spacing::linear : Spacing::logarithmic;
+  sweep.start_hz = read_frequency(section, "start_hz", rate_hz);
+  sweep.stop_hz = read_frequency(section, "stop_hz", rate_hz);
+  sweep.points = static_cast<std::uint32_t>(section.integer("points", {.min = 1, .max = 100'000}));
+  if (sweep.points > 1 && sweep.start_hz == sweep.stop_hz) {
+    section.refuse("stop_hz", "must differ from start_hz when there is more than one point");
+  }
+}
+
+void read_amplitude(const Section& section, SweepSettings& sweep) {
+  if (section.has("amplitude_table")) {
+    if (section.has("amplitude")) {
+      section.refuse("amplitude_table", "stands in place of amplitude; give one of the two");
+    }
+    for (const std::vector<double>& row : section.rows("amplitude_table", above_zero)) {
+      if (row.size() != 2)
+        section.refuse("amplitude_table", "every row is [frequency_hz, amplitude]");
+      if (!sweep.amplitude_table.empty() && row[0] <= sweep.amplitude_table.back().frequency_hz) {
+        section.refuse("amplitude_table", "the frequencies must rise");
+      }
+      sweep.amplitude_table.push_back({.frequency_hz = row[0], .amplitude = row[1]});
+    }
+    if (sweep.amplitude_table.empty()) section.refuse("amplitude_table", "must have a row");
+  } else {
+    sweep.amplitude = section.number("amplitude", above_zero);
+  }
+  sweep.follow_velocity = section.number("follow_velocity", above_zero, unlimited);
+  sweep.follow_acceleration = section.number("follow_acceleration", above_zero, unlimited);
+}
+
+Span read_span(const Section& section, const std::string& name, Span fallback, Range range) {
+  return {.cycles = section.number(name + "_cycles", range, fallback.cycles),
+          .seconds = section.number(name + "_s", zero_or_more, fallback.seconds)};
+}
+
+SweepSettings read_sweep(const Section& section, double rate_hz) {
+  SweepSettings sweep;
+  read_frequencies(section, rate_hz, sweep);
+  sweep.frequency_tolerance =
+      section.number("frequency_tolerance", {.min = 1e-9, .max = 0.1}, sweep.frequency_tolerance);
+  read_amplitude(section, sweep);
+  sweep.ramp_s = section.number("ramp_s", {.min = 0.0, .max = 3600.0}, sweep.ramp_s);
+  sweep.settle = read_span(section, "settle", sweep.settle, zero_or_more);
+  sweep.integrate = read_span(section, "integrate", sweep.integrate, zero_or_more);
+  sweep.block = read_span(section, "block", sweep.block, {.min = 1.0});
+  return sweep;
+}
+
+MotionLimits read_motion(const Section& limits) {
+  MotionLimits motion;
+  motion.command_min = limits.number("command_min", any_number, motion.command_min);
+  motion.command_max = limits.number("command_max", any_number, motion.command_max);
+  motion.slew_per_s = limits.number("slew_per_s", above_zero, motion.slew_per_s);
+  motion.velocity_max = limits.number("velocity_max", above_zero, motion.velocity_max);
+  motion.acceleration_max = limits.number("acceleration_max", above_zero, motion.acceleration_max);
+  if (!(motion.command_min < motion.command_max)) {
+    limits.refuse("command_min", "must be below command_max");
+  }
+  return motion;
+}
+
+ChannelLimits read_channel_limits(const Section& sensor) {
+  ChannelLimits limits;
+  limits.min = sensor.number("min", any_number, limits.min);
+  limits.max = sensor.number("max", any_number, limits.max);
+  limits.rate_per_s = sensor.number("rate_per_s", above_zero, limits.rate_per_s);
+  if (!(limits.min < limits.max)) sensor.refuse("min", "must be below max");
+  return limits;
+}
+
+Channel read_channel(Section section, const std::string& name) {
+  return {.name = name,
+          .unit = section.text("unit", "1"),
+          .driver = section.text("driver", "sim"),
+          .section = section};
+}
+
+GuardSettings read_guard(const Section& limits, const MotionLimits& motion, double rate_hz) {
+  GuardSettings guard;
+  guard.command_min = motion.command_min;
+  guard.command_max = motion.command_max;
+  guard.slew_per_s = motion.slew_per_s;
+  const double default_age_s = std::max(0.1, 10.0 / rate_hz);
+  guard.max_age_ns = std::llround(limits.number("age_s", zero_or_more, default_age_s) * 1e9);
+  guard.max_write_faults = static_cast<std::uint32_t>(
+      limits.integer("write_faults", {.min = 0, .max = 1e6}, guard.max_write_faults));
+  guard.stop_ramp_ticks = static_cast<std::uint64_t>(
+      std::llround(limits.number("stop_ramp_s", {.min = 0.0, .max = 60.0}, 0.0) * rate_hz));
+  return guard;
+}
+
+}  // namespace
+
+SweepPlan Rig::plan() const {
+  try {
+    return plan_sweep(sweep, motion, rate_hz);
+  } catch (const PlanRefused& refused) {
+    file->section(refused.section()).refuse(refused.key(), refused.what());
+  }
+}
+
+std::vector<std::string> Rig::sensor_names() const {
+  std::vector<std::string> names;
+  for (const Channel& sensor : sensors) names.push_back(sensor.name);
+  return names;
+}
+
+Rig read_rig(std::unique_ptr<RigFile> file) {
+  const Section loop = file->section("loop");
+  const Section sweep = file->section("sweep");
+  const Section limits = file->section("limits");
+  Rig rig{.file = nullptr, .actuator = read_channel(file->section("actuator"), "command")};
+  for (const Section& section : file->children("sensor")) {
+    rig.sensors.push_back(read_channel(section, section.name().substr(sizeof "sensor")));
+  }
+  if (rig.sensors.empty()) {
+    throw ConfigError(file->name() + ": there is no sensor; add a section [sensor.NAME]");
+  }
+  if (rig.sensors.size() > max_channels - first_sensor_channel) {
+    throw ConfigError(file->name() + ": at most 14 sensors can be read in one run");
+  }
+
+  const bool simulated = rig.actuator.driver == "sim" &&
+                         std::all_of(rig.sensors.begin(), rig.sensors.end(),
+                                     [](const Channel& sensor) { return sensor.driver == "sim"; });
+  rig.rate_hz = read_rate(loop);
+  rig.clock = read_clock(loop, simulated);
+  rig.sweep = read_sweep(sweep, rig.rate_hz);
+  rig.motion = read_motion(limits);
+  rig.guard = read_guard(limits, rig.motion, rig.rate_hz);
+  rig.guard.neutral = rig.actuator.section.number("neutral", any_number, 0.0);
+  if (rig.guard.neutral < rig.motion.command_min || rig.guard.neutral > rig.motion.command_max) {
+    rig.actuator.section.refuse("neutral", "must lie between [limits] command_min and command_max");
+  }
+  rig.sweep.offset = rig.guard.neutral;
+  for (const Channel& sensor : rig.sensors) {
+    rig.guard.channels.push_back(read_channel_limits(sensor.section));
+  }
+  if (const auto output = file->find("output")) {
+    rig.record_samples = output->flag("samples", false);
+  }
+  rig.file = std::move(file);
+  return rig;
+}
+
+}  // namespace sinerig::config

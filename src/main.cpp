@@ -1,0 +1,7 @@
+// The composition root: the only file that knows every driver.
+#include "cli/app.h"
+#include "sim/sim_driver.h"
+
+int main(int argc, char** argv) {
+  return sinerig::cli::run_app(argc, argv, {sinerig::sim::sim_driver()});
+}

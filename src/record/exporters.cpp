@@ -1,0 +1,153 @@
+#include "record/exporters.h"
+
+#include <cmath>
+#include <numbers>
+#include <ostream>
+
+#include <nlohmann/json.hpp>
+
+namespace sinerig::record {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
+
+double gain_db(std::complex<double> response) {
+  return 20.0 * std::log10(std::abs(response));
+}
+
+std::string field(double value) {
+  if (!std::isfinite(value)) return {};
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", value);
+  return text;
+}
+
+Json plan_json(const SweepPlan& plan) {
+  Json dwells = Json::array();
+  for (const Dwell& dwell : plan.dwells) {
+    Json tones = Json::array();
+    for (const Tone& tone : dwell.tones) {
+      tones.push_back({{"freq_hz", dwell.tone_hz(tone, plan.rate_hz)},
+                       {"cycles", tone.cycles},
+                       {"amplitude", tone.amplitude},
+                       {"phase_rad", tone.phase_rad}});
+    }
+    dwells.push_back({{"asked_hz", dwell.asked_hz},
+                      {"block_samples", dwell.block_samples},
+                      {"ramp_samples", dwell.ramp_samples},
+                      {"settle_samples", dwell.settle_samples},
+                      {"blocks", dwell.blocks},
+                      {"tones", tones}});
+  }
+  return dwells;
+}
+
+Json response_json(const StoredRun& run, const StoredResponse& response) {
+  const std::vector<double> phase = unwrapped_phase(response.points);
+  Json points = Json::array();
+  for (std::size_t i = 0; i < response.points.size(); ++i) {
+    const StoredPoint& point = response.points[i];
+    points.push_back({{"freq_hz", point.frequency_hz},
+                      {"re", point.response.real()},
+                      {"im", point.response.imag()},
+                      {"gain_db", gain_db(point.response)},
+                      {"phase_deg", phase[i] * degrees_per_radian},
+                      {"var_re", point.covariance.re_re},
+                      {"cov_re_im", point.covariance.re_im},
+                      {"var_im", point.covariance.im_im},
+                      {"input_amplitude", point.input_amplitude},
+                      {"output_amplitude", point.output_amplitude},
+                      {"blocks", point.blocks},
+                      {"dwell", point.dwell},
+                      {"status", point.status},
+                      {"reason", point.reason},
+                      {"reason_value", point.reason_value}});
+  }
+  const ChannelInfo& input = run.channels.at(response.input);
+  const ChannelInfo& output = run.channels.at(response.output);
+  return {{"input", input.name},
+          {"output", output.name},
+          {"input_unit", input.unit},
+          {"output_unit", output.unit},
+          {"points", points}};
+}
+
+Json events_json(const StoredRun& run) {
+  Json events = Json::array();
+  for (const StoredEvent& event : run.events) {
+    Json row = {{"tick", event.tick}, {"dwell", event.dwell}, {"kind", event.kind}};
+    if (event.channel != 0) row["channel"] = run.channels.at(event.channel).name;
+    if (event.fault != "none") row["fault"] = event.fault;
+    if (event.value != 0.0) row["value"] = event.value;
+    if (!event.detail.empty()) row["detail"] = event.detail;
+    events.push_back(std::move(row));
+  }
+  return events;
+}
+
+Json timing_json(const StoredRun& run) {
+  Json timings = Json::array();
+  for (const StoredTiming& timing : run.timings) {
+    timings.push_back({{"dwell", timing.dwell},
+                       {"first_tick", timing.first_tick},
+                       {"ticks", timing.ticks},
+                       {"skipped", timing.skipped},
+                       {"voided_blocks", timing.voided_blocks},
+                       {"resettles", timing.resettles},
+                       {"max_lateness_ns", timing.max_lateness_ns},
+                       {"lateness_us", timing.lateness_us}});
+  }
+  return timings;
+}
+
+}  // namespace
+
+void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response) {
+  stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im,input_amplitude,"
+            "output_amplitude,blocks,status,reason,reason_value,input,output\n";
+  const std::vector<double> phase = unwrapped_phase(response.points);
+  for (std::size_t i = 0; i < response.points.size(); ++i) {
+    const StoredPoint& point = response.points[i];
+    for (const double value :
+         {point.frequency_hz, point.response.real(), point.response.imag(), gain_db(point.response),
+          phase[i] * degrees_per_radian, point.covariance.re_re, point.covariance.re_im,
+          point.covariance.im_im, point.input_amplitude, point.output_amplitude}) {
+      stream << field(value) << ',';
+    }
+    stream << point.blocks << ',' << point.status << ',' << point.reason << ','
+           << field(point.reason_value) << ',' << run.channels.at(point.input).name << ','
+           << run.channels.at(point.output).name << '\n';
+  }
+}
+
+// nlohmann writes NaN and infinity as null.
+void write_json(std::ostream& stream, const StoredRun& run) {
+  Json facts;
+  for (const auto& [key, value] : run.facts) {
+    if (key != "rig_text" && key != "rig_name" && key != "rate_hz") facts[key] = value;
+  }
+  Json channels = Json::array();
+  for (const ChannelInfo& channel : run.channels) {
+    channels.push_back({{"name", channel.name}, {"unit", channel.unit}});
+  }
+  Json responses = Json::array();
+  for (const StoredResponse& response : run.responses)
+    responses.push_back(response_json(run, response));
+  const Json document = {{"format", "sinerig-sweep"},
+                         {"format_version", 1},
+                         {"rate_hz", run.plan.rate_hz},
+                         {"convention", "H = Y/U, Y = b1 + j a1, y ~ a0 + a1 cos wt + b1 sin wt"},
+                         {"rig", {{"name", run.fact("rig_name")}, {"text", run.fact("rig_text")}}},
+                         {"run", facts},
+                         {"channels", channels},
+                         {"plan", plan_json(run.plan)},
+                         {"responses", responses},
+                         {"events", events_json(run)},
+                         {"timing", timing_json(run)}};
+  stream << document.dump(1) << '\n';
+}
+
+}  // namespace sinerig::record

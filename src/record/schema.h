@@ -1,0 +1,104 @@
+// The sweep file, version 1. SQLite keeps the comments, so `sqlite3 NAME.sweep .schema` documents
+// any file by itself.
+#pragma once
+
+#include <cstdint>
+
+namespace sinerig::record {
+
+inline constexpr std::int64_t application_id = 0x53524947;  // "SRIG"
+inline constexpr std::int64_t schema_version = 1;
+
+inline constexpr const char* schema_sql = R"sql(
+CREATE TABLE run (        -- facts about the whole run, one per row
+  key   TEXT PRIMARY KEY, -- rig_name, rig_text, rate_hz, clock, started_utc, finished_utc, host, …
+  value ANY
+) WITHOUT ROWID;
+
+CREATE TABLE channel (
+  id   INTEGER PRIMARY KEY, -- 0 command, 1 applied, 2… sensors in the order of the rig file
+  name TEXT NOT NULL,
+  unit TEXT NOT NULL
+);
+
+CREATE TABLE dwell (             -- the plan
+  id             INTEGER PRIMARY KEY, -- running order from 0
+  asked_hz       REAL NOT NULL,
+  block_samples  INTEGER NOT NULL,
+  ramp_samples   INTEGER NOT NULL,
+  settle_samples INTEGER NOT NULL,    -- ramp included
+  blocks         INTEGER NOT NULL
+);
+
+CREATE TABLE tone (
+  dwell     INTEGER NOT NULL REFERENCES dwell,
+  tone      INTEGER NOT NULL,
+  cycles    INTEGER NOT NULL,   -- per block: frequency = rate_hz · cycles / block_samples
+  amplitude REAL NOT NULL,      -- of the command, in its unit
+  phase_rad REAL NOT NULL,
+  PRIMARY KEY (dwell, tone)
+) WITHOUT ROWID;
+
+CREATE TABLE point (            -- H = Y/U at one frequency, written when its dwell has finished
+  dwell            INTEGER NOT NULL REFERENCES dwell,
+  tone             INTEGER NOT NULL,
+  input            INTEGER NOT NULL REFERENCES channel,
+  output           INTEGER NOT NULL REFERENCES channel,
+  freq_hz          REAL NOT NULL,
+  re               REAL,        -- of H, unit of output per unit of input; NULL: no block completed
+  im               REAL,
+  var_re           REAL,        -- covariance of (re, im); NULL: fewer than two blocks
+  cov_re_im        REAL,
+  var_im           REAL,
+  input_amplitude  REAL,
+  output_amplitude REAL,
+  blocks           INTEGER NOT NULL,
+  status           TEXT NOT NULL, -- good unsettled low_signal clipped distorted rt_fault stopped
+  reason           TEXT NOT NULL,
+  reason_value     REAL,
+  PRIMARY KEY (dwell, tone, input, output)
+) WITHOUT ROWID;
+
+CREATE TABLE block (            -- y ~ mean + a cos(ωt) + b sin(ωt), t = 0 at the start of the dwell
+  dwell      INTEGER NOT NULL,
+  block      INTEGER NOT NULL,
+  tone       INTEGER NOT NULL,
+  channel    INTEGER NOT NULL,
+  first_tick INTEGER NOT NULL,
+  a          REAL,
+  b          REAL,
+  mean       REAL,
+  PRIMARY KEY (dwell, block, tone, channel)
+) WITHOUT ROWID;
+
+CREATE TABLE timing (           -- of the loop, per dwell
+  dwell           INTEGER PRIMARY KEY,
+  first_tick      INTEGER NOT NULL,
+  ticks           INTEGER NOT NULL, -- executed
+  skipped         INTEGER NOT NULL, -- lost to overruns
+  voided_blocks   INTEGER NOT NULL,
+  resettles       INTEGER NOT NULL,
+  max_lateness_ns INTEGER NOT NULL,
+  lateness_us     TEXT NOT NULL     -- counts: below 1 µs, [1, 2), [2, 4), [4, 8) µs …
+);
+
+CREATE TABLE event (
+  id      INTEGER PRIMARY KEY,
+  tick    INTEGER NOT NULL,
+  dwell   INTEGER NOT NULL,
+  kind    TEXT NOT NULL,
+  channel INTEGER,              -- NULL where it concerns none
+  fault   TEXT NOT NULL,
+  value   REAL,
+  detail  TEXT NOT NULL         -- for people
+);
+
+CREATE TABLE sample (           -- only with [output] samples = true
+  tick    INTEGER NOT NULL,
+  channel INTEGER NOT NULL,
+  value   REAL,
+  PRIMARY KEY (tick, channel)
+) WITHOUT ROWID;
+)sql";
+
+}  // namespace sinerig::record

@@ -1,0 +1,159 @@
+#include "record/sweep_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+
+#include "record/schema.h"
+
+namespace sinerig::record {
+
+namespace {
+
+template <typename Integer>
+Integer whole(const Statement& row, int column) {
+  return static_cast<Integer>(row.integer(column));
+}
+
+void check_identity(Database& database, const std::string& path) {
+  if (database.pragma("application_id") != application_id) {
+    throw SweepFileError(path + ": is not a sweep file");
+  }
+  const std::int64_t stored_version = database.pragma("user_version");
+  if (stored_version > schema_version) {
+    throw SweepFileError(path + ": was written by a newer sinerig (file version " +
+                         std::to_string(stored_version) + ", this one reads up to " +
+                         std::to_string(schema_version) + ")");
+  }
+}
+
+SweepPlan read_plan(Database& database, double rate_hz) {
+  SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
+  Statement dwells{database,
+                   "SELECT asked_hz, block_samples, ramp_samples, settle_samples, blocks "
+                   "FROM dwell ORDER BY id"};
+  while (dwells.step()) {
+    plan.dwells.push_back({.asked_hz = dwells.number(0),
+                           .block_samples = whole<std::uint64_t>(dwells, 1),
+                           .tones = {},
+                           .ramp_samples = whole<std::uint64_t>(dwells, 2),
+                           .settle_samples = whole<std::uint64_t>(dwells, 3),
+                           .blocks = whole<std::uint32_t>(dwells, 4)});
+  }
+  Statement tones{database,
+                  "SELECT dwell, cycles, amplitude, phase_rad FROM tone ORDER BY dwell, tone"};
+  while (tones.step()) {
+    plan.dwells.at(whole<std::size_t>(tones, 0))
+        .tones.push_back({.cycles = whole<std::uint64_t>(tones, 1),
+                          .amplitude = tones.number(2),
+                          .phase_rad = tones.number(3)});
+  }
+  return plan;
+}
+
+std::vector<StoredResponse> read_responses(Database& database) {
+  std::vector<StoredResponse> responses;
+  Statement rows{database,
+                 "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, "
+                 "input_amplitude, output_amplitude, blocks, status, reason, reason_value "
+                 "FROM point ORDER BY input, output, freq_hz, dwell"};
+  while (rows.step()) {
+    StoredPoint point{.dwell = whole<std::uint32_t>(rows, 0),
+                      .tone = whole<std::uint32_t>(rows, 1),
+                      .input = whole<std::uint32_t>(rows, 2),
+                      .output = whole<std::uint32_t>(rows, 3),
+                      .frequency_hz = rows.number(4),
+                      .response = {rows.number(5), rows.number(6)},
+                      .covariance = {rows.number(7), rows.number(8), rows.number(9)},
+                      .input_amplitude = rows.number(10),
+                      .output_amplitude = rows.number(11),
+                      .blocks = whole<std::uint32_t>(rows, 12),
+                      .status = rows.text(13),
+                      .reason = rows.text(14),
+                      .reason_value = rows.number(15)};
+    const bool same_pair = !responses.empty() && responses.back().input == point.input &&
+                           responses.back().output == point.output;
+    if (!same_pair)
+      responses.push_back({.input = point.input, .output = point.output, .points = {}});
+    responses.back().points.push_back(std::move(point));
+  }
+  return responses;
+}
+
+std::vector<StoredEvent> read_events(Database& database) {
+  std::vector<StoredEvent> events;
+  Statement rows{
+      database,
+      "SELECT tick, dwell, kind, ifnull(channel, 0), fault, value, detail FROM event ORDER BY id"};
+  while (rows.step()) {
+    events.push_back({.tick = whole<std::uint64_t>(rows, 0),
+                      .dwell = whole<std::uint32_t>(rows, 1),
+                      .kind = rows.text(2),
+                      .channel = whole<std::uint32_t>(rows, 3),
+                      .fault = rows.text(4),
+                      .value = rows.number(5),
+                      .detail = rows.text(6)});
+  }
+  return events;
+}
+
+std::vector<StoredTiming> read_timings(Database& database) {
+  std::vector<StoredTiming> timings;
+  Statement rows{database,
+                 "SELECT dwell, first_tick, ticks, skipped, voided_blocks, resettles, "
+                 "max_lateness_ns, lateness_us FROM timing ORDER BY dwell"};
+  while (rows.step()) {
+    timings.push_back({.dwell = whole<std::uint32_t>(rows, 0),
+                       .first_tick = whole<std::uint64_t>(rows, 1),
+                       .ticks = whole<std::uint64_t>(rows, 2),
+                       .skipped = whole<std::uint64_t>(rows, 3),
+                       .voided_blocks = whole<std::uint32_t>(rows, 4),
+                       .resettles = whole<std::uint32_t>(rows, 5),
+                       .max_lateness_ns = rows.integer(6),
+                       .lateness_us = rows.text(7)});
+  }
+  return timings;
+}
+
+}  // namespace
+
+std::string StoredRun::fact(const std::string& key) const {
+  const auto found = facts.find(key);
+  return found == facts.end() ? std::string{} : found->second;
+}
+
+StoredRun read_sweep(const std::string& path) {
+  if (!std::filesystem::exists(path)) throw SweepFileError(path + ": does not exist");
+  Database database{path, Database::Mode::read};
+  check_identity(database, path);
+
+  StoredRun run;
+  Statement facts{database, "SELECT key, value FROM run"};
+  while (facts.step()) run.facts.emplace(facts.text(0), facts.text(1));
+  Statement channels{database, "SELECT name, unit FROM channel ORDER BY id"};
+  while (channels.step())
+    run.channels.push_back({.name = channels.text(0), .unit = channels.text(1)});
+  run.plan = read_plan(database, std::strtod(run.fact("rate_hz").c_str(), nullptr));
+  run.responses = read_responses(database);
+  run.events = read_events(database);
+  run.timings = read_timings(database);
+  return run;
+}
+
+std::vector<double> unwrapped_phase(const std::vector<StoredPoint>& points) {
+  constexpr double turn = 2.0 * std::numbers::pi;
+  std::vector<double> phase;
+  double previous = 0.0;
+  for (const StoredPoint& point : points) {
+    double value = std::arg(point.response);
+    if (!phase.empty() && std::isfinite(value)) {
+      value += turn * std::round((previous - value) / turn);
+    }
+    if (std::isfinite(value)) previous = value;
+    phase.push_back(value);
+  }
+  return phase;
+}
+
+}  // namespace sinerig::record

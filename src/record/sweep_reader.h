@@ -1,0 +1,74 @@
+// Reads NAME.sweep back into plain values.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "record/sweep_writer.h"
+
+namespace sinerig::record {
+
+struct StoredPoint {
+  std::uint32_t dwell = 0;
+  std::uint32_t tone = 0;
+  std::uint32_t input = 0;
+  std::uint32_t output = 0;
+  double frequency_hz = 0.0;
+  std::complex<double> response{};  // NaN where no block completed
+  Covariance2 covariance{};         // NaN below two blocks
+  double input_amplitude = 0.0;
+  double output_amplitude = 0.0;
+  std::uint32_t blocks = 0;
+  std::string status;
+  std::string reason;
+  double reason_value = 0.0;
+};
+
+struct StoredEvent {
+  std::uint64_t tick = 0;
+  std::uint32_t dwell = 0;
+  std::string kind;
+  std::uint32_t channel = 0;  // 0 = none
+  std::string fault;
+  double value = 0.0;
+  std::string detail;
+};
+
+struct StoredTiming {
+  std::uint32_t dwell = 0;
+  std::uint64_t first_tick = 0;
+  std::uint64_t ticks = 0;
+  std::uint64_t skipped = 0;
+  std::uint32_t voided_blocks = 0;
+  std::uint32_t resettles = 0;
+  std::int64_t max_lateness_ns = 0;
+  std::string lateness_us;
+};
+
+// The points of one pair of channels, by rising frequency.
+struct StoredResponse {
+  std::uint32_t input = 0;
+  std::uint32_t output = 0;
+  std::vector<StoredPoint> points;
+};
+
+struct StoredRun {
+  std::map<std::string, std::string> facts;  // the table `run`
+  std::vector<ChannelInfo> channels;
+  SweepPlan plan;
+  std::vector<StoredResponse> responses;
+  std::vector<StoredEvent> events;
+  std::vector<StoredTiming> timings;
+
+  // A fact, empty where the file has none.
+  std::string fact(const std::string& key) const;
+};
+
+// Throws SweepFileError for what is no sweep file, or one of a newer version.
+StoredRun read_sweep(const std::string& path);
+
+// arg H in radians along the points, jumps above half a turn taken out.
+std::vector<double> unwrapped_phase(const std::vector<StoredPoint>& points);
+
+}  // namespace sinerig::record

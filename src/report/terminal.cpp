@@ -1,0 +1,173 @@
+#include "report/terminal.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <numbers>
+#include <ostream>
+
+namespace sinerig::report {
+
+namespace {
+
+constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
+
+[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
+  char buffer[512];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(buffer, sizeof buffer, format, arguments);
+  va_end(arguments);
+  return buffer;
+}
+
+double seconds_of(std::uint64_t samples, double rate_hz) {
+  return static_cast<double>(samples) / rate_hz;
+}
+
+// Where the law that sets the amplitude changes: A, then V/ω, then Acc/ω².
+std::string break_points(const SweepSettings& sweep) {
+  if (!sweep.amplitude_table.empty()) return {};
+  constexpr double two_pi = 2.0 * std::numbers::pi;
+  std::string lines;
+  const double to_velocity = sweep.follow_velocity / sweep.amplitude / two_pi;
+  const double to_acceleration = sweep.follow_acceleration / sweep.follow_velocity / two_pi;
+  const double straight_to_acceleration =
+      std::sqrt(sweep.follow_acceleration / sweep.amplitude) / two_pi;
+  if (std::isfinite(to_velocity) && !(to_acceleration < to_velocity)) {
+    lines += text("the amplitude follows the velocity above %.4g Hz\n", to_velocity);
+    if (std::isfinite(to_acceleration)) {
+      lines += text("the amplitude follows the acceleration above %.4g Hz\n", to_acceleration);
+    }
+  } else if (std::isfinite(straight_to_acceleration)) {
+    lines +=
+        text("the amplitude follows the acceleration above %.4g Hz\n", straight_to_acceleration);
+  }
+  return lines;
+}
+
+std::string point_text(double frequency_hz, std::complex<double> response, const char* status,
+                       const char* reason) {
+  return text("%10.4f Hz  %9.3f dB  %8.2f°  %s%s%s", frequency_hz,
+              20.0 * std::log10(std::abs(response)), std::arg(response) * degrees_per_radian,
+              status, *reason == '\0' ? "" : ": ", reason);
+}
+
+}  // namespace
+
+std::string duration_text(double seconds) {
+  const auto whole = static_cast<long>(std::llround(seconds));
+  if (whole < 3600) return text("%ld:%02ld", whole / 60, whole % 60);
+  return text("%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings& sweep,
+                const std::string& unit) {
+  stream << text("amplitude in %s, velocity in %s/s, acceleration in %s/s²\n", unit.c_str(),
+                 unit.c_str(), unit.c_str());
+  stream << text("%5s %12s %14s %11s %11s %12s %10s %7s %9s %9s\n", "point", "asked Hz", "exact Hz",
+                 "amplitude", "velocity", "acceleration", "settle s", "blocks", "block s",
+                 "total s");
+  for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
+    const Dwell& dwell = plan.dwells[i];
+    const double frequency_hz = dwell.frequency_hz(plan.rate_hz);
+    const double omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
+    const double amplitude = dwell.tones.front().amplitude;
+    stream << text(
+        "%5zu %12.6g %14.9g %11.4g %11.4g %12.4g %10.3f %7u %9.4f %9.3f\n", i + 1, dwell.asked_hz,
+        frequency_hz, amplitude, amplitude * omega_rad_s, amplitude * omega_rad_s * omega_rad_s,
+        seconds_of(dwell.settle_samples, plan.rate_hz), dwell.blocks,
+        seconds_of(dwell.block_samples, plan.rate_hz), seconds_of(dwell.samples(), plan.rate_hz));
+  }
+  stream << break_points(sweep);
+  const std::size_t asked = asked_frequencies(sweep).size();
+  if (asked > plan.dwells.size()) {
+    stream << asked - plan.dwells.size() << " of " << asked
+           << " points fell on a frequency already planned and were merged\n";
+  }
+  stream << text("%zu points, %s (%.1f s) of bench time\n", plan.dwells.size(),
+                 duration_text(plan.seconds()).c_str(), plan.seconds());
+}
+
+void print_run(std::ostream& stream, const record::StoredRun& run) {
+  stream << text("rig      %s, %g Hz, %s clock\n", run.fact("rig_name").c_str(), run.plan.rate_hz,
+                 run.fact("clock").c_str());
+  stream << text("run      %s on %s, sinerig %s\n", run.fact("started_utc").c_str(),
+                 run.fact("host").c_str(), run.fact("sinerig").c_str());
+  const std::string outcome = run.fact("outcome");
+  stream << "outcome  " << (outcome.empty() ? "not finished" : outcome) << '\n';
+  std::uint64_t ticks = 0;
+  std::uint64_t skipped = 0;
+  std::int64_t max_lateness_ns = 0;
+  for (const record::StoredTiming& timing : run.timings) {
+    ticks += timing.ticks;
+    skipped += timing.skipped;
+    max_lateness_ns = std::max(max_lateness_ns, timing.max_lateness_ns);
+  }
+  stream << text("loop     %llu ticks, %llu skipped, %.1f µs late at most\n",
+                 static_cast<unsigned long long>(ticks), static_cast<unsigned long long>(skipped),
+                 static_cast<double>(max_lateness_ns) * 1e-3);
+  for (const record::StoredResponse& response : run.responses) {
+    const record::ChannelInfo& input = run.channels.at(response.input);
+    const record::ChannelInfo& output = run.channels.at(response.output);
+    stream << text("\n%s / %s   (%s per %s)\n", output.name.c_str(), input.name.c_str(),
+                   output.unit.c_str(), input.unit.c_str());
+    stream << text("%14s %11s %12s %12s %7s  %s\n", "Hz", "gain dB", "phase °", "amplitude",
+                   "blocks", "status");
+    const std::vector<double> phase = record::unwrapped_phase(response.points);
+    for (std::size_t i = 0; i < response.points.size(); ++i) {
+      const record::StoredPoint& point = response.points[i];
+      stream << text("%14.6f %11.4f %12.3f %12.4g %7u  %s", point.frequency_hz,
+                     20.0 * std::log10(std::abs(point.response)), phase[i] * degrees_per_radian,
+                     point.input_amplitude, point.blocks, point.status.c_str());
+      if (!point.reason.empty())
+        stream << text(": %s %.3g", point.reason.c_str(), point.reason_value);
+      stream << '\n';
+    }
+  }
+  for (const record::StoredEvent& event : run.events) {
+    if (!event.detail.empty()) stream << "\n" << event.kind << ": " << event.detail << '\n';
+  }
+}
+
+Progress::Progress(std::ostream& stream, bool terminal, const SweepPlan& plan)
+    : stream_{stream},
+      terminal_{terminal},
+      plan_{plan},
+      total_samples_{plan.samples()},
+      start_{std::chrono::steady_clock::now()} {}
+
+void Progress::point(const Point& point) {
+  if (point.tone != 0 || point.output != first_sensor_channel) return;
+  last_point_ = point_text(point.frequency_hz, point.response, to_string(point.status),
+                           to_string(point.reason));
+  if (!terminal_) {
+    stream_ << text("%4u/%zu ", point.dwell + 1, plan_.dwells.size()) << last_point_ << '\n';
+  }
+}
+
+void Progress::update(std::uint32_t dwell, std::uint64_t tick) {
+  if (!terminal_) return;
+  constexpr int width = 30;
+  const double done =
+      std::min(1.0, static_cast<double>(tick) / static_cast<double>(total_samples_));
+  const double elapsed_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+  const double remaining_s = done > 0.0 ? elapsed_s * (1.0 - done) / done : plan_.seconds();
+  const int filled = static_cast<int>(done * width);
+  const std::size_t number = std::min<std::size_t>(dwell, plan_.dwells.size() - 1);
+  std::string bar;
+  for (int i = 0; i < width; ++i) bar += i < filled ? "█" : "░";
+  stream_ << "\r\033[K" << bar
+          << text(" %zu/%zu  %.4g Hz  %s elapsed, %s left", number + 1, plan_.dwells.size(),
+                  plan_.dwells[number].frequency_hz(plan_.rate_hz),
+                  duration_text(elapsed_s).c_str(), duration_text(remaining_s).c_str());
+  if (!last_point_.empty()) stream_ << "  last " << last_point_;
+  stream_ << std::flush;
+}
+
+void Progress::close() {
+  if (terminal_) stream_ << "\r\033[K" << std::flush;
+}
+
+}  // namespace sinerig::report

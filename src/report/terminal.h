@@ -1,0 +1,47 @@
+// What people read on a terminal: the plan, the points, the progress of a run.
+#pragma once
+
+#include <chrono>
+#include <iosfwd>
+#include <string>
+
+#include "record/sweep_reader.h"
+#include "sweep/plan.h"
+#include "sweep/records.h"
+
+namespace sinerig::report {
+
+// Dwells with frequency asked and exact, amplitude, peak velocity and acceleration, settling,
+// blocks and seconds; then the total. `unit` is the command's.
+void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings& sweep,
+                const std::string& unit);
+
+// How the run went, and a table of points per response.
+void print_run(std::ostream& stream, const record::StoredRun& run);
+
+// 93784 s → "26:03:04", 12.3 s → "0:12".
+std::string duration_text(double seconds);
+
+// Progress of a run: one line that is rewritten on a terminal, a line per point elsewhere.
+class Progress {
+ public:
+  Progress(std::ostream& stream, bool terminal, const SweepPlan& plan);
+
+  // A finished point of the first sensor.
+  void point(const Point& point);
+
+  // Where the loop is.
+  void update(std::uint32_t dwell, std::uint64_t tick);
+
+  void close();
+
+ private:
+  std::ostream& stream_;
+  bool terminal_;
+  const SweepPlan& plan_;
+  std::uint64_t total_samples_;
+  std::chrono::steady_clock::time_point start_;
+  std::string last_point_;
+};
+
+}  // namespace sinerig::report
