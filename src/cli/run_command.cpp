@@ -116,7 +116,7 @@ RunOutcome play(SweepRunner& runner, RunControl& control, Outbox& outbox,
   }};
   const auto show = [&] {
     for (const Point& point : inbox.take()) progress.point(point);
-    progress.update(control.dwell.load(), control.tick.load());
+    progress.update(control.dwell.load());
   };
   while (!done.load()) {
     show();
@@ -147,7 +147,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const SweepPlan plan = rig.plan();
   Clock& clock = configured.clock();
   spdlog::info("{} points, {} of bench time", plan.dwells.size(),
-               report::duration_text(plan.seconds()));
+               report::bench_time_text(plan));
 
   const std::string path =
       options.output.empty() ? default_output(options.rig, options.force) : options.output;

@@ -11,6 +11,9 @@ namespace sinerig::config {
 
 namespace {
 
+// Where the wait is fixed and nothing is said of its length.
+constexpr Span default_fixed_wait{.cycles = 4.0, .seconds = 0.5};
+
 double read_rate(const Section& loop) {
   const double rate_hz =
       loop.number("rate_hz", {.min = TickGrid::min_rate_hz, .max = TickGrid::max_rate_hz});
@@ -92,9 +95,19 @@ SweepSettings read_sweep(const Section& section, double rate_hz) {
       section.number("frequency_tolerance", {.min = 1e-9, .max = 0.1}, sweep.frequency_tolerance);
   read_amplitude(section, sweep);
   sweep.ramp_s = section.number("ramp_s", {.min = 0.0, .max = 3600.0}, sweep.ramp_s);
+  const std::string settling = section.choice("settling", {"detect", "fixed"});
+  sweep.settling = settling == "fixed" ? Settling::fixed : Settling::detect;
+  if (sweep.settling == Settling::fixed) sweep.settle = default_fixed_wait;
   sweep.settle = read_span(section, "settle", sweep.settle, zero_or_more);
+  sweep.settle_max = read_span(section, "settle_max", sweep.settle_max, zero_or_more);
   sweep.integrate = read_span(section, "integrate", sweep.integrate, zero_or_more);
+  sweep.integrate_max = read_span(section, "integrate_max", sweep.integrate_max, zero_or_more);
   sweep.block = read_span(section, "block", sweep.block, {.min = 1.0});
+  sweep.target_db = section.number("target_db", {.min = 0.0, .max = 20.0}, sweep.target_db);
+  sweep.target_deg = section.number("target_deg", {.min = 0.0, .max = 90.0}, sweep.target_deg);
+  sweep.harmonics = static_cast<std::uint32_t>(
+      section.integer("harmonics", {.min = 1.0, .max = 16.0}, sweep.harmonics));
+  sweep.max_distortion = section.number("max_distortion", above_zero, sweep.max_distortion);
   return sweep;
 }
 

@@ -40,6 +40,7 @@ Json plan_json(const SweepPlan& plan) {
                       {"ramp_samples", dwell.ramp_samples},
                       {"settle_samples", dwell.settle_samples},
                       {"blocks", dwell.blocks},
+                      {"max_samples", dwell.max_samples},
                       {"tones", tones}});
   }
   return dwells;
@@ -58,9 +59,17 @@ Json response_json(const StoredRun& run, const StoredResponse& response) {
                       {"var_re", point.covariance.re_re},
                       {"cov_re_im", point.covariance.re_im},
                       {"var_im", point.covariance.im_im},
+                      {"dof", point.dof},
+                      {"gain_interval_db", point.gain_interval_db},
+                      {"phase_interval_deg", point.phase_interval_deg},
                       {"input_amplitude", point.input_amplitude},
                       {"output_amplitude", point.output_amplitude},
-                      {"blocks", point.blocks},
+                      {"snr_db", point.snr_db},
+                      {"distortion", point.distortion},
+                      {"drift_per_s", point.drift_per_s},
+                      {"samples", point.samples},
+                      {"lost", point.lost},
+                      {"seconds", point.seconds},
                       {"dwell", point.dwell},
                       {"status", point.status},
                       {"reason", point.reason},
@@ -95,7 +104,6 @@ Json timing_json(const StoredRun& run) {
                        {"first_tick", timing.first_tick},
                        {"ticks", timing.ticks},
                        {"skipped", timing.skipped},
-                       {"voided_blocks", timing.voided_blocks},
                        {"resettles", timing.resettles},
                        {"max_lateness_ns", timing.max_lateness_ns},
                        {"lateness_us", timing.lateness_us}});
@@ -106,18 +114,21 @@ Json timing_json(const StoredRun& run) {
 }  // namespace
 
 void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response) {
-  stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im,input_amplitude,"
-            "output_amplitude,blocks,status,reason,reason_value,input,output\n";
+  stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im,dof,gain_interval_db,"
+            "phase_interval_deg,input_amplitude,output_amplitude,snr_db,distortion,drift_per_s,samples,"
+            "lost,seconds,status,reason,reason_value,input,output\n";
   const std::vector<double> phase = unwrapped_phase(response.points);
   for (std::size_t i = 0; i < response.points.size(); ++i) {
     const StoredPoint& point = response.points[i];
     for (const double value :
          {point.frequency_hz, point.response.real(), point.response.imag(), gain_db(point.response),
           phase[i] * degrees_per_radian, point.covariance.re_re, point.covariance.re_im,
-          point.covariance.im_im, point.input_amplitude, point.output_amplitude}) {
+          point.covariance.im_im, point.dof, point.gain_interval_db, point.phase_interval_deg,
+          point.input_amplitude, point.output_amplitude, point.snr_db, point.distortion,
+          point.drift_per_s, point.samples, point.lost, point.seconds}) {
       stream << field(value) << ',';
     }
-    stream << point.blocks << ',' << point.status << ',' << point.reason << ','
+    stream << point.status << ',' << point.reason << ','
            << field(point.reason_value) << ',' << run.channels.at(point.input).name << ','
            << run.channels.at(point.output).name << '\n';
   }

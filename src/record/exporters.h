@@ -8,7 +8,7 @@
 
 namespace sinerig::record {
 
-// freq_hz,re,im,gain_db,phase_deg (phase unwrapped), then covariance, amplitudes, status. One
+// freq_hz,re,im,gain_db,phase_deg (phase unwrapped), then covariance, intervals, amplitudes, quality, status. One
 // response, rising frequency; numbers round-trip, NaN is an empty field.
 void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response);
 

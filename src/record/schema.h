@@ -26,8 +26,9 @@ CREATE TABLE dwell (             -- the plan
   asked_hz       REAL NOT NULL,
   block_samples  INTEGER NOT NULL,
   ramp_samples   INTEGER NOT NULL,
-  settle_samples INTEGER NOT NULL,    -- ramp included
-  blocks         INTEGER NOT NULL
+  settle_samples INTEGER NOT NULL,    -- waited for before measuring, ramp included
+  blocks         INTEGER NOT NULL,    -- measured at least
+  max_samples    INTEGER NOT NULL     -- of the whole dwell at most, settling included
 );
 
 CREATE TABLE tone (
@@ -47,19 +48,28 @@ CREATE TABLE point (            -- H = Y/U at one frequency, written when its dw
   freq_hz          REAL NOT NULL,
   re               REAL,        -- of H, unit of output per unit of input; NULL: no block completed
   im               REAL,
-  var_re           REAL,        -- covariance of (re, im); NULL: fewer than two blocks
+  var_re           REAL,        -- covariance of (re, im); NULL: not known
   cov_re_im        REAL,
   var_im           REAL,
+  dof              REAL,        -- degrees of freedom behind the covariance
+  gain_interval_db   REAL,      -- half widths of the 95 % intervals, what the transient may have
+  phase_interval_deg REAL,      -- left included
   input_amplitude  REAL,
   output_amplitude REAL,
-  blocks           INTEGER NOT NULL,
+  snr_db           REAL,        -- power of the tone over that of the residual, per sample
+  distortion       REAL,        -- harmonics beyond the noise, relative to the tone
+  drift_per_s      REAL,        -- of the output
+  samples          REAL NOT NULL, -- that the estimate was made from
+  lost             REAL NOT NULL, -- that were missing among them
+  seconds          REAL NOT NULL, -- bench time of the dwell
   status           TEXT NOT NULL, -- good unsettled low_signal clipped distorted rt_fault stopped
   reason           TEXT NOT NULL,
   reason_value     REAL,
   PRIMARY KEY (dwell, tone, input, output)
 ) WITHOUT ROWID;
 
-CREATE TABLE block (            -- y ~ mean + a cos(ωt) + b sin(ωt), t = 0 at the start of the dwell
+CREATE TABLE block (            -- plain sums of a complete block: y ~ mean + a cos(ωt) + b sin(ωt),
+                                -- t = 0 at the start of the dwell
   dwell      INTEGER NOT NULL,
   block      INTEGER NOT NULL,
   tone       INTEGER NOT NULL,
@@ -76,7 +86,6 @@ CREATE TABLE timing (           -- of the loop, per dwell
   first_tick      INTEGER NOT NULL,
   ticks           INTEGER NOT NULL, -- executed
   skipped         INTEGER NOT NULL, -- lost to overruns
-  voided_blocks   INTEGER NOT NULL,
   resettles       INTEGER NOT NULL,
   max_lateness_ns INTEGER NOT NULL,
   lateness_us     TEXT NOT NULL     -- counts: below 1 µs, [1, 2), [2, 4), [4, 8) µs …

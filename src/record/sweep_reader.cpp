@@ -31,7 +31,8 @@ void check_identity(Database& database, const std::string& path) {
 SweepPlan read_plan(Database& database, double rate_hz) {
   SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
   Statement dwells{database,
-                   "SELECT asked_hz, block_samples, ramp_samples, settle_samples, blocks "
+                   "SELECT asked_hz, block_samples, ramp_samples, settle_samples, blocks, "
+                   "max_samples "
                    "FROM dwell ORDER BY id"};
   while (dwells.step()) {
     plan.dwells.push_back({.asked_hz = dwells.number(0),
@@ -39,7 +40,8 @@ SweepPlan read_plan(Database& database, double rate_hz) {
                            .tones = {},
                            .ramp_samples = whole<std::uint64_t>(dwells, 2),
                            .settle_samples = whole<std::uint64_t>(dwells, 3),
-                           .blocks = whole<std::uint32_t>(dwells, 4)});
+                           .blocks = whole<std::uint32_t>(dwells, 4),
+                           .max_samples = whole<std::uint64_t>(dwells, 5)});
   }
   Statement tones{database,
                   "SELECT dwell, cycles, amplitude, phase_rad FROM tone ORDER BY dwell, tone"};
@@ -55,8 +57,9 @@ SweepPlan read_plan(Database& database, double rate_hz) {
 std::vector<StoredResponse> read_responses(Database& database) {
   std::vector<StoredResponse> responses;
   Statement rows{database,
-                 "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, "
-                 "input_amplitude, output_amplitude, blocks, status, reason, reason_value "
+                 "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, dof, "
+                 "gain_interval_db, phase_interval_deg, input_amplitude, output_amplitude, snr_db, "
+                 "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value "
                  "FROM point ORDER BY input, output, freq_hz, dwell"};
   while (rows.step()) {
     StoredPoint point{.dwell = whole<std::uint32_t>(rows, 0),
@@ -66,12 +69,20 @@ std::vector<StoredResponse> read_responses(Database& database) {
                       .frequency_hz = rows.number(4),
                       .response = {rows.number(5), rows.number(6)},
                       .covariance = {rows.number(7), rows.number(8), rows.number(9)},
-                      .input_amplitude = rows.number(10),
-                      .output_amplitude = rows.number(11),
-                      .blocks = whole<std::uint32_t>(rows, 12),
-                      .status = rows.text(13),
-                      .reason = rows.text(14),
-                      .reason_value = rows.number(15)};
+                      .dof = rows.number(10),
+                      .gain_interval_db = rows.number(11),
+                      .phase_interval_deg = rows.number(12),
+                      .input_amplitude = rows.number(13),
+                      .output_amplitude = rows.number(14),
+                      .snr_db = rows.number(15),
+                      .distortion = rows.number(16),
+                      .drift_per_s = rows.number(17),
+                      .samples = rows.number(18),
+                      .lost = rows.number(19),
+                      .seconds = rows.number(20),
+                      .status = rows.text(21),
+                      .reason = rows.text(22),
+                      .reason_value = rows.number(23)};
     const bool same_pair = !responses.empty() && responses.back().input == point.input &&
                            responses.back().output == point.output;
     if (!same_pair)
@@ -101,17 +112,16 @@ std::vector<StoredEvent> read_events(Database& database) {
 std::vector<StoredTiming> read_timings(Database& database) {
   std::vector<StoredTiming> timings;
   Statement rows{database,
-                 "SELECT dwell, first_tick, ticks, skipped, voided_blocks, resettles, "
+                 "SELECT dwell, first_tick, ticks, skipped, resettles, "
                  "max_lateness_ns, lateness_us FROM timing ORDER BY dwell"};
   while (rows.step()) {
     timings.push_back({.dwell = whole<std::uint32_t>(rows, 0),
                        .first_tick = whole<std::uint64_t>(rows, 1),
                        .ticks = whole<std::uint64_t>(rows, 2),
                        .skipped = whole<std::uint64_t>(rows, 3),
-                       .voided_blocks = whole<std::uint32_t>(rows, 4),
-                       .resettles = whole<std::uint32_t>(rows, 5),
-                       .max_lateness_ns = rows.integer(6),
-                       .lateness_us = rows.text(7)});
+                       .resettles = whole<std::uint32_t>(rows, 4),
+                       .max_lateness_ns = rows.integer(5),
+                       .lateness_us = rows.text(6)});
   }
   return timings;
 }

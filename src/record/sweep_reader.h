@@ -16,10 +16,18 @@ struct StoredPoint {
   std::uint32_t output = 0;
   double frequency_hz = 0.0;
   std::complex<double> response{};  // NaN where no block completed
-  Covariance2 covariance{};         // NaN below two blocks
+  Covariance2 covariance{};         // NaN where not known
+  double dof = 0.0;                 // 0: covariance and intervals are not known
+  double gain_interval_db = 0.0;    // half widths of the 95 % intervals
+  double phase_interval_deg = 0.0;
   double input_amplitude = 0.0;
   double output_amplitude = 0.0;
-  std::uint32_t blocks = 0;
+  double snr_db = 0.0;
+  double distortion = 0.0;
+  double drift_per_s = 0.0;
+  double samples = 0.0;
+  double lost = 0.0;
+  double seconds = 0.0;
   std::string status;
   std::string reason;
   double reason_value = 0.0;
@@ -40,7 +48,6 @@ struct StoredTiming {
   std::uint64_t first_tick = 0;
   std::uint64_t ticks = 0;
   std::uint64_t skipped = 0;
-  std::uint32_t voided_blocks = 0;
   std::uint32_t resettles = 0;
   std::int64_t max_lateness_ns = 0;
   std::string lateness_us;

@@ -42,6 +42,12 @@ std::string exact(double value) {
   return text;
 }
 
+std::string placeholders(int count) {
+  std::string text = "?";
+  for (int i = 1; i < count; ++i) text += ", ?";
+  return text;
+}
+
 std::string histogram_text(const DwellTiming& timing) {
   std::string text;
   for (const std::uint32_t count : timing.lateness) {
@@ -56,10 +62,9 @@ std::string histogram_text(const DwellTiming& timing) {
 struct SweepWriter::Statements {
   explicit Statements(Database& database)
       : run{database, "INSERT OR REPLACE INTO run VALUES (?, ?)"},
-        point{database,
-              "INSERT INTO point VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)"},
+        point{database, "INSERT INTO point VALUES (" + placeholders(24) + ")"},
         block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?)"},
-        timing{database, "INSERT INTO timing VALUES (?, ?, ?, ?, ?, ?, ?, ?)"},
+        timing{database, "INSERT INTO timing VALUES (?, ?, ?, ?, ?, ?, ?)"},
         event{database, "INSERT INTO event VALUES (NULL, ?, ?, ?, nullif(?, 0), ?, ?, ?)"},
         sample{database, "INSERT INTO sample VALUES (?, ?, ?)"} {}
 
@@ -130,13 +135,12 @@ void SweepWriter::set(const std::string& key, const std::string& value) {
 }
 
 void SweepWriter::write_plan(const SweepPlan& plan) {
-  Statement insert_dwell{database_, "INSERT INTO dwell VALUES (?, ?, ?, ?, ?, ?)"};
+  Statement insert_dwell{database_, "INSERT INTO dwell VALUES (?, ?, ?, ?, ?, ?, ?)"};
   Statement insert_tone{database_, "INSERT INTO tone VALUES (?, ?, ?, ?, ?)"};
   for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
     const Dwell& dwell = plan.dwells[i];
     insert_dwell
-        .bind(i, dwell.asked_hz, dwell.block_samples, dwell.ramp_samples, dwell.settle_samples,
-              dwell.blocks)
+        .bind(i, dwell.asked_hz, dwell.block_samples, dwell.ramp_samples, dwell.settle_samples, dwell.blocks, dwell.max_samples)
         .run();
     for (std::size_t k = 0; k < dwell.tones.size(); ++k) {
       const Tone& tone = dwell.tones[k];
@@ -156,9 +160,10 @@ void SweepWriter::insert(const Point& point) {
   statements_->point
       .bind(point.dwell, point.tone, point.input, point.output, point.frequency_hz,
             point.response.real(), point.response.imag(), point.covariance.re_re,
-            point.covariance.re_im, point.covariance.im_im, point.input_amplitude,
-            point.output_amplitude, point.blocks, to_string(point.status), to_string(point.reason),
-            point.reason_value)
+            point.covariance.re_im, point.covariance.im_im, point.dof, point.gain_interval_db,
+            point.phase_interval_deg, point.input_amplitude, point.output_amplitude, point.snr_db,
+            point.distortion, point.drift_per_s, point.samples, point.lost, point.seconds,
+            to_string(point.status), to_string(point.reason), point.reason_value)
       .run();
 }
 
@@ -171,8 +176,7 @@ void SweepWriter::insert(const Block& block) {
 
 void SweepWriter::insert(const DwellTiming& timing) {
   statements_->timing
-      .bind(timing.dwell, timing.first_tick, timing.ticks, timing.skipped, timing.voided_blocks,
-            timing.resettles, timing.max_lateness_ns, histogram_text(timing))
+      .bind(timing.dwell, timing.first_tick, timing.ticks, timing.skipped, timing.resettles, timing.max_lateness_ns, histogram_text(timing))
       .run();
 }
 

@@ -61,23 +61,31 @@ std::string duration_text(double seconds) {
   return text("%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
+std::string bench_time_text(const SweepPlan& plan) {
+  const std::string least = duration_text(plan.min_seconds());
+  if (plan.min_samples() == plan.max_samples()) return least + text(" (%.1f s)", plan.min_seconds());
+  return least + " to " + duration_text(plan.max_seconds()) +
+         text(" (%.1f to %.1f s)", plan.min_seconds(), plan.max_seconds());
+}
+
 void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings& sweep,
                 const std::string& unit) {
   stream << text("amplitude in %s, velocity in %s/s, acceleration in %s/s²\n", unit.c_str(),
                  unit.c_str(), unit.c_str());
-  stream << text("%5s %12s %14s %11s %11s %12s %10s %7s %9s %9s\n", "point", "asked Hz", "exact Hz",
-                 "amplitude", "velocity", "acceleration", "settle s", "blocks", "block s",
-                 "total s");
+  stream << text("%5s %12s %14s %11s %11s %12s %9s %7s %9s %10s %10s\n", "point", "asked Hz",
+                 "exact Hz", "amplitude", "velocity", "acceleration", "settle s", "blocks", "block s",
+                 "at least s", "at most s");
   for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
     const Dwell& dwell = plan.dwells[i];
     const double frequency_hz = dwell.frequency_hz(plan.rate_hz);
     const double omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
     const double amplitude = dwell.tones.front().amplitude;
     stream << text(
-        "%5zu %12.6g %14.9g %11.4g %11.4g %12.4g %10.3f %7u %9.4f %9.3f\n", i + 1, dwell.asked_hz,
+        "%5zu %12.6g %14.9g %11.4g %11.4g %12.4g %9.3f %7u %9.4f %10.3f %10.3f\n", i + 1, dwell.asked_hz,
         frequency_hz, amplitude, amplitude * omega_rad_s, amplitude * omega_rad_s * omega_rad_s,
         seconds_of(dwell.settle_samples, plan.rate_hz), dwell.blocks,
-        seconds_of(dwell.block_samples, plan.rate_hz), seconds_of(dwell.samples(), plan.rate_hz));
+        seconds_of(dwell.block_samples, plan.rate_hz), seconds_of(dwell.min_samples(), plan.rate_hz),
+        seconds_of(dwell.max_samples, plan.rate_hz));
   }
   stream << break_points(sweep);
   const std::size_t asked = asked_frequencies(sweep).size();
@@ -85,8 +93,7 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
     stream << asked - plan.dwells.size() << " of " << asked
            << " points fell on a frequency already planned and were merged\n";
   }
-  stream << text("%zu points, %s (%.1f s) of bench time\n", plan.dwells.size(),
-                 duration_text(plan.seconds()).c_str(), plan.seconds());
+  stream << plan.dwells.size() << " points, " << bench_time_text(plan) << " of bench time\n";
 }
 
 void print_run(std::ostream& stream, const record::StoredRun& run) {
@@ -112,14 +119,16 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
     const record::ChannelInfo& output = run.channels.at(response.output);
     stream << text("\n%s / %s   (%s per %s)\n", output.name.c_str(), input.name.c_str(),
                    output.unit.c_str(), input.unit.c_str());
-    stream << text("%14s %11s %12s %12s %7s  %s\n", "Hz", "gain dB", "phase °", "amplitude",
-                   "blocks", "status");
+    stream << text("%12s %10s %8s %10s %8s %10s %7s %7s %8s  %s\n", "Hz", "gain dB", "± dB",
+                   "phase °", "± °", "amplitude", "SNR dB", "THD %", "seconds", "status");
     const std::vector<double> phase = record::unwrapped_phase(response.points);
     for (std::size_t i = 0; i < response.points.size(); ++i) {
       const record::StoredPoint& point = response.points[i];
-      stream << text("%14.6f %11.4f %12.3f %12.4g %7u  %s", point.frequency_hz,
-                     20.0 * std::log10(std::abs(point.response)), phase[i] * degrees_per_radian,
-                     point.input_amplitude, point.blocks, point.status.c_str());
+      stream << text("%12.6f %10.4f %8.2g %10.3f %8.2g %10.4g %7.1f %7.2f %8.2f  %s",
+                     point.frequency_hz, 20.0 * std::log10(std::abs(point.response)),
+                     point.gain_interval_db, phase[i] * degrees_per_radian,
+                     point.phase_interval_deg, point.input_amplitude, point.snr_db,
+                     100.0 * point.distortion, point.seconds, point.status.c_str());
       if (!point.reason.empty())
         stream << text(": %s %.3g", point.reason.c_str(), point.reason_value);
       stream << '\n';
@@ -134,7 +143,6 @@ Progress::Progress(std::ostream& stream, bool terminal, const SweepPlan& plan)
     : stream_{stream},
       terminal_{terminal},
       plan_{plan},
-      total_samples_{plan.samples()},
       start_{std::chrono::steady_clock::now()} {}
 
 void Progress::point(const Point& point) {
@@ -146,14 +154,20 @@ void Progress::point(const Point& point) {
   }
 }
 
-void Progress::update(std::uint32_t dwell, std::uint64_t tick) {
+// How much is done is counted in the least that each dwell takes; what the finished ones took on top
+// tells the rest.
+void Progress::update(std::uint32_t dwell) {
   if (!terminal_) return;
   constexpr int width = 30;
+  std::uint64_t done_samples = 0;
+  for (std::size_t i = 0; i < std::min<std::size_t>(dwell, plan_.dwells.size()); ++i) {
+    done_samples += plan_.dwells[i].min_samples();
+  }
   const double done =
-      std::min(1.0, static_cast<double>(tick) / static_cast<double>(total_samples_));
+      static_cast<double>(done_samples) / static_cast<double>(plan_.min_samples());
   const double elapsed_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  const double remaining_s = done > 0.0 ? elapsed_s * (1.0 - done) / done : plan_.seconds();
+  const double remaining_s = done > 0.0 ? elapsed_s * (1.0 - done) / done : plan_.min_seconds();
   const int filled = static_cast<int>(done * width);
   const std::size_t number = std::min<std::size_t>(dwell, plan_.dwells.size() - 1);
   std::string bar;

@@ -19,6 +19,9 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
 // How the run went, and a table of points per response.
 void print_run(std::ostream& stream, const record::StoredRun& run);
 
+// "7:34 (454.5 s)", or the least and the most where the plan leaves it open.
+std::string bench_time_text(const SweepPlan& plan);
+
 // 93784 s → "26:03:04", 12.3 s → "0:12".
 std::string duration_text(double seconds);
 
@@ -31,7 +34,7 @@ class Progress {
   void point(const Point& point);
 
   // Where the loop is.
-  void update(std::uint32_t dwell, std::uint64_t tick);
+  void update(std::uint32_t dwell);
 
   void close();
 
@@ -39,7 +42,6 @@ class Progress {
   std::ostream& stream_;
   bool terminal_;
   const SweepPlan& plan_;
-  std::uint64_t total_samples_;
   std::chrono::steady_clock::time_point start_;
   std::string last_point_;
 };

@@ -1,54 +1,179 @@
 #include "sweep/estimator.h"
 
-#include <limits>
+#include <algorithm>
+#include <cmath>
 
 namespace sinerig {
 
 namespace {
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+std::complex<double> phasor_of(const std::vector<double>& beta, std::size_t bin) noexcept {
+  return {beta[Regression::sine_row(bin)], beta[Regression::cosine_row(bin)]};
+}
+
+// Referred from the tick to the true time of the samples.
+std::complex<double> turn(double omega_rad_s, std::int64_t offset_ns) noexcept {
+  return std::polar(1.0, -omega_rad_s * static_cast<double>(offset_ns) * 1e-9);
+}
+
+// Covariance of q z, z = (re, im) with covariance c, q a complex number.
+Covariance2 multiplied(const Covariance2& c, std::complex<double> q) noexcept {
+  const double r = q.real();
+  const double i = q.imag();
+  return {.re_re = r * r * c.re_re - 2.0 * r * i * c.re_im + i * i * c.im_im,
+          .re_im = r * i * (c.re_re - c.im_im) + (r * r - i * i) * c.re_im,
+          .im_im = i * i * c.re_re + 2.0 * r * i * c.re_im + r * r * c.im_im};
+}
+
+Covariance2 sum(const Covariance2& a, const Covariance2& b) noexcept {
+  return {a.re_re + b.re_re, a.re_im + b.re_im, a.im_im + b.im_im};
+}
 
 }  // namespace
 
-void ResponseEstimator::add(std::complex<double> output, std::complex<double> input) noexcept {
-  const std::array<double, 4> value{output.real(), output.imag(), input.real(), input.imag()};
-  ++blocks_;
-  std::array<double, 4> before{};
-  std::array<double, 4> after{};
-  for (std::size_t i = 0; i < 4; ++i) {
-    before[i] = value[i] - mean_[i];
-    mean_[i] += before[i] / blocks_;
-    after[i] = value[i] - mean_[i];
-  }
-  for (std::size_t i = 0; i < 4; ++i) {
-    for (std::size_t j = 0; j < 4; ++j) scatter_[i][j] += before[i] * after[j];
-  }
+WindowEstimator::WindowEstimator(std::size_t max_bins)
+    : input_{2 + 2 * max_bins},
+      output_{2 + 2 * max_bins},
+      cluster_{2 + 2 * max_bins},
+      column_(2 + 2 * max_bins),
+      moved_output_(2 + 2 * max_bins),
+      moved_input_(2 + 2 * max_bins) {}
+
+double WindowEstimator::Solution::variance(std::size_t order) const noexcept {
+  const double dof = std::max(1.0, sums.count - static_cast<double>(order));
+  return residual_square / dof;
 }
 
-std::complex<double> ResponseEstimator::response() const noexcept {
-  if (blocks_ == 0 || input() == std::complex<double>{}) return {nan, nan};
-  return output() / input();
+bool WindowEstimator::solve(const Regression& regression, const Window& window, std::size_t channel,
+                            Solution& solution) noexcept {
+  const std::size_t order = regression.order();
+  regression.window(channel, window.first, window.last, solution.sums);
+  if (solution.sums.count <= static_cast<double>(order)) return false;
+  if (!solution.solver.factor(solution.sums.gram, order)) return false;
+  std::copy_n(solution.sums.moments.begin(), order, solution.beta.begin());
+  solution.solver.solve(std::span{solution.beta}.first(order));
+  double explained = 0.0;
+  for (std::size_t i = 0; i < order; ++i) explained += solution.beta[i] * solution.sums.moments[i];
+  solution.residual_square = std::max(0.0, solution.sums.square - explained);
+  return true;
 }
 
-Covariance2 ResponseEstimator::covariance() const noexcept {
-  if (blocks_ < 2 || input() == std::complex<double>{}) return {nan, nan, nan};
-  // dH = (dY − H dU) / U, as a real 2×4 matrix on (Re dY, Im dY, Re dU, Im dU).
-  const std::complex<double> by_output = 1.0 / input();
-  const std::complex<double> by_input = -response() / input();
-  const double jacobian[2][4] = {
-      {by_output.real(), -by_output.imag(), by_input.real(), -by_input.imag()},
-      {by_output.imag(), by_output.real(), by_input.imag(), by_input.real()}};
-  const double scale = 1.0 / (static_cast<double>(blocks_) * (blocks_ - 1.0));
-  const auto element = [&](std::size_t row, std::size_t column) {
-    double sum = 0.0;
-    for (std::size_t i = 0; i < 4; ++i) {
-      for (std::size_t j = 0; j < 4; ++j) {
-        sum += jacobian[row][i] * scatter_[i][j] * jacobian[column][j];
-      }
+bool WindowEstimator::estimate(const Regression& regression, const Window& window, const Pair& pair,
+                               std::span<const double> omega_rad_s,
+                               std::span<Estimate> estimates) noexcept {
+  const std::size_t order = regression.order();
+  if (!solve(regression, window, pair.input, input_)) return false;
+  if (!solve(regression, window, pair.output, output_)) return false;
+  const auto length = static_cast<double>(regression.samples_at(window.last) -
+                                          regression.samples_at(window.first));
+  for (std::size_t tone = 0; tone < estimates.size(); ++tone) {
+    input_.turn[tone] = turn(omega_rad_s[tone], regression.common_offset_ns(pair.input));
+    output_.turn[tone] = turn(omega_rad_s[tone], regression.common_offset_ns(pair.output));
+    Estimate& estimate = estimates[tone];
+    estimate = {};
+    estimate.samples = output_.sums.count;
+    estimate.lost = length - output_.sums.count;
+    take_coefficients(pair, order, tone, estimate);
+    if (estimate.input == std::complex<double>{}) return false;
+  }
+  const double noise = output_.variance(order);
+  double harmonics = 0.0;
+  for (std::size_t bin = estimates.size(); bin < omega_rad_s.size(); ++bin) {
+    // Three times its expectation is what noise alone exceeds in one bin of twenty.
+    const double floor = 3.0 * 4.0 * noise / output_.sums.count;
+    harmonics += std::max(0.0, std::norm(phasor_of(output_.beta, bin)) - floor);
+  }
+  estimates[0].distortion = std::sqrt(harmonics) / std::abs(estimates[0].output);
+  take_clusters(regression, window, pair, estimates);
+  return true;
+}
+
+void WindowEstimator::take_coefficients(const Pair& pair, std::size_t order, std::size_t tone,
+                                        Estimate& estimate) noexcept {
+  estimate.input = phasor_of(input_.beta, tone) * input_.turn[tone];
+  estimate.output = phasor_of(output_.beta, tone) * output_.turn[tone];
+  if (estimate.input == std::complex<double>{}) return;
+  estimate.response = estimate.output / estimate.input;
+
+  // σ² times the tone's block of the inverse Gram matrix, for z = b + j a.
+  const auto covariance = [&](const Solution& solution) {
+    const double variance = solution.variance(order);
+    const std::size_t rows[2] = {Regression::sine_row(tone), Regression::cosine_row(tone)};
+    double block[2][2];
+    for (int k = 0; k < 2; ++k) {
+      std::fill(column_.begin(), column_.end(), 0.0);
+      column_[rows[k]] = 1.0;
+      solution.solver.solve(std::span{column_}.first(order));
+      block[k][0] = column_[rows[0]] * variance;
+      block[k][1] = column_[rows[1]] * variance;
     }
-    return sum * scale;
+    return Covariance2{block[0][0], block[0][1], block[1][1]};
   };
-  return {.re_re = element(0, 0), .re_im = element(0, 1), .im_im = element(1, 1)};
+  estimate.white = multiplied(covariance(output_), output_.turn[tone] / estimate.input);
+  if (!pair.exact_input) {
+    const auto by_input = -estimate.response * input_.turn[tone] / estimate.input;
+    estimate.white = sum(estimate.white, multiplied(covariance(input_), by_input));
+  }
+  estimate.residual_rms = std::sqrt(output_.variance(order));
+  estimate.drift_per_sample = output_.beta[Regression::drift_row];
+}
+
+// How the cluster in cluster_ moves the coefficients: G⁻¹ (S_q − G_q β).
+void WindowEstimator::influence(const Solution& solution, std::size_t order,
+                                std::vector<double>& moved) noexcept {
+  const std::span score{moved.data(), order};
+  multiply(cluster_.gram, {solution.beta.data(), order}, score);
+  for (std::size_t i = 0; i < order; ++i) score[i] = cluster_.moments[i] - score[i];
+  solution.solver.solve(score);
+}
+
+// Mean square of the output's residual in the cluster in cluster_.
+double WindowEstimator::cluster_residual(std::size_t order) noexcept {
+  multiply(cluster_.gram, {output_.beta.data(), order}, {column_.data(), order});
+  double residual = cluster_.square;
+  for (std::size_t i = 0; i < order; ++i) {
+    residual += output_.beta[i] * (column_[i] - 2.0 * cluster_.moments[i]);
+  }
+  return residual / std::max(1.0, cluster_.count);
+}
+
+void WindowEstimator::take_clusters(const Regression& regression, const Window& window,
+                                    const Pair& pair, std::span<Estimate> estimates) noexcept {
+  const std::size_t order = regression.order();
+  double clusters = 0.0;
+  double worst = 0.0;
+  double power = 0.0;
+  for (std::size_t end = window.last; end >= window.first + window.cluster; end -= window.cluster) {
+    const std::size_t begin = end - window.cluster;
+    regression.window(pair.output, begin, end, cluster_);
+    influence(output_, order, moved_output_);
+    const double residual = cluster_residual(order);
+    worst = std::max(worst, residual);
+    power += residual;
+    if (!pair.exact_input) {
+      regression.window(pair.input, begin, end, cluster_);
+      influence(input_, order, moved_input_);
+    }
+    for (std::size_t tone = 0; tone < estimates.size(); ++tone) {
+      Estimate& estimate = estimates[tone];
+      auto moved = phasor_of(moved_output_, tone) * output_.turn[tone];
+      if (!pair.exact_input) {
+        moved -= estimate.response * phasor_of(moved_input_, tone) * input_.turn[tone];
+      }
+      estimate.scatter += 0.5 * std::norm(moved / estimate.input);
+    }
+    clusters += 1.0;
+  }
+  const double others = (power - worst) / std::max(1.0, clusters - 1.0);
+  for (Estimate& estimate : estimates) {
+    if (clusters < 2.0) {
+      estimate.scatter = 0.0;
+      continue;
+    }
+    estimate.scatter *= clusters / (clusters - 1.0);
+    estimate.scatter_dof = 2.0 * (clusters - 1.0);
+    estimate.burst = others > 0.0 ? worst / others : 1.0;
+  }
 }
 
 }  // namespace sinerig

@@ -1,11 +1,16 @@
-// From blocks to a point: the ratio of two measured Fourier coefficients and its covariance.
+// From a window of the regression to a point: the ratio of two Fourier coefficients, its covariance
+// from two sides (the residual, the scatter of the window's clusters), and what else the window
+// tells of its quality.
 #pragma once
 
-#include <array>
 #include <complex>
 #include <cstdint>
+#include <span>
+#include <vector>
 
 #include "sweep/nonblocking.h"
+#include "sweep/normal_equations.h"
+#include "sweep/regression.h"
 
 namespace sinerig {
 
@@ -14,32 +19,80 @@ struct Covariance2 {
   double re_re = 0.0;
   double re_im = 0.0;
   double im_im = 0.0;
+
+  double mean_variance() const noexcept { return 0.5 * (re_re + im_im); }
+  Covariance2 scaled(double factor) const noexcept {
+    return {re_re * factor, re_im * factor, im_im * factor};
+  }
 };
 
-// H = mean(Y) / mean(U) over the blocks of a dwell, both as measured, so that a clamped or
-// quantised command does no harm. Streaming (Welford), no allocation.
-class ResponseEstimator {
+struct Pair {
+  std::size_t input = 0;  // regression channels
+  std::size_t output = 1;
+  bool exact_input = true;  // the input is known, not measured: it carries no noise of its own
+};
+
+// A window of the regression, in checkpoints, and the clusters that it is cut into.
+struct Window {
+  std::size_t first = 0;
+  std::size_t last = 0;
+  std::size_t cluster = 1;  // checkpoints per cluster
+};
+
+struct Estimate {
+  std::complex<double> response;
+  std::complex<double> input;   // U and Y at their true times, b + j a
+  std::complex<double> output;
+  Covariance2 white;            // of H, were the residual white
+  double scatter = 0.0;         // variance of one component of H from the clusters
+  double scatter_dof = 0.0;     // 0: too few clusters
+  double residual_rms = 0.0;    // of the output
+  double distortion = 0.0;      // of the output: harmonics beyond the noise, relative to the tone
+  double drift_per_sample = 0.0;
+  double burst = 0.0;           // residual power of the worst cluster over that of the others
+  double lost = 0.0;            // samples of the output that are missing
+  double samples = 0.0;         // of the output that were used
+};
+
+class WindowEstimator {
  public:
-  void reset() noexcept { *this = {}; }
+  explicit WindowEstimator(std::size_t max_bins);
 
-  // Y and U of one block, as b + j a.
-  void add(std::complex<double> output, std::complex<double> input) noexcept SINERIG_NONBLOCKING;
-
-  std::uint32_t blocks() const noexcept { return blocks_; }
-  std::complex<double> input() const noexcept { return {mean_[2], mean_[3]}; }
-  std::complex<double> output() const noexcept { return {mean_[0], mean_[1]}; }
-
-  // NaN before the first block or without any input.
-  std::complex<double> response() const noexcept;
-
-  // Of the mean over the blocks, from their scatter about Y = H U (first order in the errors of Y
-  // and U together). NaN below two blocks.
-  Covariance2 covariance() const noexcept;
+  // One estimate per tone; bins beyond are harmonics of the first. `omega_rad_s` per bin. False where
+  // the window does not determine the coefficients.
+  bool estimate(const Regression& regression, const Window& window, const Pair& pair,
+                std::span<const double> omega_rad_s,
+                std::span<Estimate> estimates) noexcept SINERIG_NONBLOCKING;
 
  private:
-  std::uint32_t blocks_ = 0;
-  std::array<double, 4> mean_{};                    // Re Y, Im Y, Re U, Im U
-  std::array<std::array<double, 4>, 4> scatter_{};  // sums of products of deviations
+  // The solution of one channel over the window.
+  struct Solution {
+    NormalSums sums;
+    NormalSolver solver;
+    std::vector<double> beta;
+    double residual_square = 0.0;
+    std::vector<std::complex<double>> turn;  // per tone: from the tick to the samples' true time
+
+    explicit Solution(std::size_t max_order)
+        : sums{max_order}, solver{max_order}, beta(max_order), turn(max_order) {}
+    double variance(std::size_t order) const noexcept;
+  };
+
+  bool solve(const Regression& regression, const Window& window, std::size_t channel,
+             Solution& solution) noexcept;
+  void take_coefficients(const Pair& pair, std::size_t order, std::size_t tone,
+                         Estimate& estimate) noexcept;
+  void take_clusters(const Regression& regression, const Window& window, const Pair& pair,
+                     std::span<Estimate> estimates) noexcept;
+  double cluster_residual(std::size_t order) noexcept;
+  void influence(const Solution& solution, std::size_t order, std::vector<double>& moved) noexcept;
+
+  Solution input_;
+  Solution output_;
+  NormalSums cluster_;
+  std::vector<double> column_;
+  std::vector<double> moved_output_;
+  std::vector<double> moved_input_;
 };
 
 }  // namespace sinerig

@@ -4,10 +4,12 @@
 
 namespace sinerig {
 
-Excitation::Excitation(std::size_t max_tones) : voices_(max_tones), phasors_(max_tones) {}
+Excitation::Excitation(std::size_t max_tones, std::size_t max_bins)
+    : voices_(max_tones), phasors_(max_bins) {}
 
 void Excitation::start(const Dwell& dwell, double from_scale) noexcept {
   tones_ = dwell.tones.size();
+  bins_ = dwell.bins();
   elapsed_ = 0;
   ramp_samples_ = dwell.ramp_samples;
   from_scale_ = from_scale;
@@ -28,6 +30,12 @@ void Excitation::advance(std::uint64_t ticks) noexcept {
 
 void Excitation::refresh() noexcept {
   for (std::size_t i = 0; i < tones_; ++i) phasors_[i] = voices_[i].phase.phasor();
+  const Phasor& tone = phasors_[0];
+  for (std::size_t i = tones_; i < bins_; ++i) {
+    const Phasor& below = i == tones_ ? tone : phasors_[i - 1];
+    phasors_[i] = {.cosine = below.cosine * tone.cosine - below.sine * tone.sine,
+                   .sine = below.sine * tone.cosine + below.cosine * tone.sine};
+  }
 }
 
 double Excitation::command() const noexcept {

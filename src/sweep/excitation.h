@@ -14,7 +14,7 @@ namespace sinerig {
 
 class Excitation {
  public:
-  explicit Excitation(std::size_t max_tones);
+  Excitation(std::size_t max_tones, std::size_t max_bins);
 
   // Begins a dwell at phase zero; over its ramp the envelope moves from `from_scale` to 1 (a scale
   // of the dwell's own amplitude, so that the amplitude itself has no step).
@@ -24,7 +24,9 @@ class Excitation {
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
 
   double command() const noexcept SINERIG_NONBLOCKING;
-  std::span<const Phasor> phasors() const noexcept { return phasors_used(); }
+
+  // One per bin: the tones, then the harmonics of the first from the second on.
+  std::span<const Phasor> phasors() const noexcept { return {phasors_.data(), bins_}; }
 
  private:
   struct Voice {
@@ -33,12 +35,12 @@ class Excitation {
     double quadrature = 0.0;  // amplitude · sin(start phase)
   };
 
-  std::span<const Phasor> phasors_used() const noexcept { return {phasors_.data(), tones_}; }
   void refresh() noexcept;
 
   std::vector<Voice> voices_;
   std::vector<Phasor> phasors_;
   std::size_t tones_ = 0;
+  std::size_t bins_ = 0;
   std::uint64_t elapsed_ = 0;
   std::uint64_t ramp_samples_ = 0;
   double from_scale_ = 1.0;

@@ -85,33 +85,59 @@ void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double
   }
 }
 
+// Parts of a block: short enough to see a transient go within a cycle, long enough to be worth
+// keeping.
+std::uint32_t part_count(std::uint64_t block_samples) {
+  constexpr std::uint64_t shortest_part = 16;
+  std::uint32_t parts = 1;
+  while (parts < 8 && block_samples / (2 * parts) >= shortest_part) parts *= 2;
+  return parts;
+}
+
+// Harmonics that stay below half the rate and apart from their images.
+std::uint32_t harmonic_count(std::uint32_t wanted, const CoherentFrequency& base) {
+  std::uint32_t highest = 1;
+  while (highest < wanted && 2 * (highest + 1) * base.cycles < base.samples) ++highest;
+  return highest;
+}
+
 Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz) {
   const CoherentFrequency base = snap(asked_hz, rate_hz, sweep.frequency_tolerance);
   const auto base_samples = static_cast<double>(base.samples);
   const double samples_per_cycle = base_samples / static_cast<double>(base.cycles);
+  const auto length = [&](const Span& span, double unit_samples) {
+    return whole_units(span, samples_per_cycle, rate_hz, unit_samples);
+  };
 
-  const double bases =
-      std::max(1.0, whole_units(sweep.block, samples_per_cycle, rate_hz, base_samples));
+  const double bases = std::max(1.0, length(sweep.block, base_samples));
   const double block_samples = bases * base_samples;
   const double ramp_samples = std::ceil(sweep.ramp_s * rate_hz - 1e-9);
-  const double settle_blocks = std::ceil(ramp_samples / block_samples) +
-                               whole_units(sweep.settle, samples_per_cycle, rate_hz, block_samples);
-  const double blocks =
-      std::max(1.0, whole_units(sweep.integrate, samples_per_cycle, rate_hz, block_samples));
-  if ((settle_blocks + blocks) * block_samples > max_dwell_samples) {
-    throw PlanRefused("sweep", "integrate_s",
-                      "the dwell at " + number(asked_hz) + " Hz would last " +
-                          number((settle_blocks + blocks) * block_samples / rate_hz) +
+  // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
+  const double settle_unit = sweep.settling == Settling::fixed ? base_samples : 1.0;
+  const double settle_samples =
+      settle_unit * std::max(std::ceil(ramp_samples / settle_unit), length(sweep.settle, settle_unit));
+  const double blocks = std::max(1.0, length(sweep.integrate, block_samples));
+  const bool open_ended = sweep.has_target() || sweep.settling == Settling::detect;
+  double max_samples = settle_samples + blocks * block_samples;
+  if (sweep.settling == Settling::detect) max_samples += length(sweep.settle_max, block_samples) * block_samples;
+  if (sweep.has_target()) max_samples += length(sweep.integrate_max, block_samples) * block_samples;
+  if (max_samples > max_dwell_samples) {
+    throw PlanRefused("sweep", open_ended ? "integrate_max_s" : "integrate_s",
+                      "the dwell at " + number(asked_hz) + " Hz could last " +
+                          number(max_samples / rate_hz) +
                           " s: shorten settling or integration, or loosen frequency_tolerance");
   }
 
   Dwell dwell;
   dwell.asked_hz = asked_hz;
   dwell.block_samples = static_cast<std::uint64_t>(block_samples);
+  dwell.parts = part_count(dwell.block_samples);
   dwell.ramp_samples = static_cast<std::uint64_t>(ramp_samples);
-  dwell.settle_samples = static_cast<std::uint64_t>(settle_blocks * block_samples);
+  dwell.settle_samples = static_cast<std::uint64_t>(settle_samples);
   dwell.blocks = static_cast<std::uint32_t>(blocks);
+  dwell.max_samples = static_cast<std::uint64_t>(max_samples);
   dwell.tones = {{.cycles = base.cycles * static_cast<std::uint64_t>(bases)}};
+  dwell.harmonics = harmonic_count(sweep.harmonics, base);
   dwell.tones.front().amplitude = amplitude_at(sweep, dwell.frequency_hz(rate_hz));
   return dwell;
 }
@@ -122,9 +148,15 @@ bool same_frequency(const Dwell& a, const Dwell& b) {
 
 }  // namespace
 
-std::uint64_t SweepPlan::samples() const {
+std::uint64_t SweepPlan::min_samples() const {
   std::uint64_t sum = 0;
-  for (const Dwell& dwell : dwells) sum += dwell.samples();
+  for (const Dwell& dwell : dwells) sum += dwell.min_samples();
+  return sum;
+}
+
+std::uint64_t SweepPlan::max_samples() const {
+  std::uint64_t sum = 0;
+  for (const Dwell& dwell : dwells) sum += dwell.max_samples;
   return sum;
 }
 
@@ -159,6 +191,10 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   check_band(frequencies_hz, sweep, rate_hz);
 
   SweepPlan plan{.rate_hz = rate_hz, .offset = sweep.offset, .dwells = {}};
+  plan.judgement = {.settling = sweep.settling,
+                    .target_db = sweep.target_db,
+                    .target_deg = sweep.target_deg,
+                    .max_distortion = sweep.max_distortion};
   for (const double asked_hz : frequencies_hz) {
     Dwell dwell = make_dwell(asked_hz, sweep, rate_hz);
     const bool duplicate =

@@ -14,6 +14,9 @@ namespace sinerig {
 
 enum class Spacing { logarithmic, linear, list };
 
+// How the end of the transient is known: waited for, or seen.
+enum class Settling { fixed, detect };
+
 struct AmplitudeBreak {
   double frequency_hz;
   double amplitude;  // unit of the command
@@ -42,9 +45,19 @@ struct SweepSettings {
   double follow_acceleration = unlimited;       // A·ω² is kept at or below this
 
   double ramp_s = 0.0;  // the amplitude moves from that of the last dwell to its own
-  Span settle{.cycles = 4.0, .seconds = 0.5};
-  Span integrate{.cycles = 8.0, .seconds = 0.5};
+
+  Settling settling = Settling::detect;
+  Span settle{.cycles = 0.0, .seconds = 0.0};     // waited for before anything is measured
+  Span settle_max{.cycles = 20.0, .seconds = 20.0};  // detect: how long settling may take
+  Span integrate{.cycles = 1.0, .seconds = 0.1};  // at least
+  Span integrate_max{.cycles = 20.0, .seconds = 20.0};  // at most, when the target is not reached
   Span block{.cycles = 1.0, .seconds = 0.02};
+  double target_db = 0.05;   // half width of the 95 % interval of the gain; 0 = no target …
+  double target_deg = 0.3;   // … and of the phase; without targets exactly `integrate` is measured
+  std::uint32_t harmonics = 3;  // highest harmonic of the tone that is watched
+  double max_distortion = 0.1;
+
+  bool has_target() const { return target_db > 0.0 || target_deg > 0.0; }
 };
 
 // What the command may ask of the rig; the plan is refused when a dwell would exceed it.
@@ -62,29 +75,46 @@ struct Tone {
   double phase_rad = 0.0;
 };
 
-// One group of tones held: ramp and settle, then blocks.
+// One group of tones held: ramp and wait, then blocks until the judgement is made.
 struct Dwell {
   double asked_hz = 0.0;
-  std::uint64_t block_samples = 1;
+  std::uint64_t block_samples = 1;  // whole cycles of every tone
+  std::uint32_t parts = 1;          // a block is cut into this many, a power of two
   std::vector<Tone> tones;
-  std::uint64_t ramp_samples = 0;    // at the start of the settling time
-  std::uint64_t settle_samples = 0;  // ramp included; a whole number of blocks
-  std::uint32_t blocks = 0;
+  std::uint32_t harmonics = 1;       // highest harmonic of the first tone in the regression
+  std::uint64_t ramp_samples = 0;    // at the start of the wait
+  std::uint64_t settle_samples = 0;  // ramp included; waited for before anything is measured
+  std::uint32_t blocks = 0;          // measured at least
+  std::uint64_t max_samples = 0;     // of the whole dwell, wait included
 
-  std::uint64_t samples() const { return settle_samples + blocks * block_samples; }
+  std::uint64_t min_samples() const { return settle_samples + blocks * block_samples; }
   double tone_hz(const Tone& tone, double rate_hz) const {
     return rate_hz * static_cast<double>(tone.cycles) / static_cast<double>(block_samples);
   }
   double frequency_hz(double rate_hz) const { return tone_hz(tones.front(), rate_hz); }
+  std::size_t bins() const { return tones.size() + harmonics - 1; }
+};
+
+// When a dwell has been measured well enough; the same for all dwells of a sweep.
+struct Judgement {
+  Settling settling = Settling::detect;
+  double target_db = 0.0;   // 0 = none
+  double target_deg = 0.0;
+  double max_distortion = 0.1;  // more than this part of the tone in harmonics is a distorted point
+
+  bool has_target() const { return target_db > 0.0 || target_deg > 0.0; }
 };
 
 struct SweepPlan {
   double rate_hz = 0.0;
   double offset = 0.0;  // the command that the tones are laid on
   std::vector<Dwell> dwells;
+  Judgement judgement{};
 
-  std::uint64_t samples() const;
-  double seconds() const { return static_cast<double>(samples()) / rate_hz; }
+  std::uint64_t min_samples() const;
+  std::uint64_t max_samples() const;
+  double min_seconds() const { return static_cast<double>(min_samples()) / rate_hz; }
+  double max_seconds() const { return static_cast<double>(max_samples()) / rate_hz; }
 };
 
 // A plan that can't be run: the message says what, `section` and `key` say which entry of the rig

@@ -19,6 +19,12 @@ const char* to_string(PointReason reason) noexcept {
   switch (reason) {
     case PointReason::none: return "";
     case PointReason::no_excitation: return "no_excitation";
+    case PointReason::no_response: return "no_response";
+    case PointReason::stuck: return "stuck";
+    case PointReason::still_moving: return "still_moving";
+    case PointReason::target_not_reached: return "target_not_reached";
+    case PointReason::harmonics: return "harmonics";
+    case PointReason::noise_burst: return "noise_burst";
     case PointReason::output_at_range: return "output_at_range";
     case PointReason::gaps: return "gaps";
     case PointReason::guard_trip: return "guard_trip";

@@ -8,9 +8,9 @@
 #include <variant>
 
 #include "drivers/driver.h"
-#include "sweep/correlator.h"
 #include "sweep/estimator.h"
 #include "sweep/guard.h"
+#include "sweep/regression.h"
 
 namespace sinerig {
 
@@ -35,10 +35,16 @@ const char* to_string(PointStatus status) noexcept;
 // Why a point has its status; the number that goes with it is Point::reason_value.
 enum class PointReason : std::uint8_t {
   none,
-  no_excitation,    // the applied signal does not hold the tone: |U| relative to the command
-  output_at_range,  // fraction of samples with Fault::range
-  gaps,             // times the dwell had to settle again
-  guard_trip,       // see the event of the same tick
+  no_excitation,       // the applied signal does not hold the tone: |U| relative to the command
+  no_response,         // the output does not move
+  stuck,               // the output never changed its value
+  output_at_range,     // part of the samples with Fault::range
+  gaps,                // times the dwell had to settle again
+  still_moving,        // the late half differs from the whole by this, dB
+  target_not_reached,  // half width of the gain's interval at the end, dB
+  harmonics,           // of the output, relative to the tone
+  noise_burst,         // power of the loudest cluster over that of the others
+  guard_trip,          // see the event of the same tick
 };
 
 const char* to_string(PointReason reason) noexcept;
@@ -55,9 +61,17 @@ struct Point {
   double frequency_hz = 0.0;
   std::complex<double> response{};
   Covariance2 covariance{};
-  double input_amplitude = 0.0;   // of the applied signal, unit of the command
-  double output_amplitude = 0.0;  // unit of the output channel
-  std::uint32_t blocks = 0;
+  double dof = 0.0;                 // degrees of freedom behind the covariance; 0: not known
+  double gain_interval_db = 0.0;    // half widths of the 95 % intervals, what the transient may
+  double phase_interval_deg = 0.0;  // have left included
+  double input_amplitude = 0.0;     // unit of the input channel
+  double output_amplitude = 0.0;    // unit of the output channel
+  double snr_db = 0.0;              // tone's power over that of the residual, per sample
+  double distortion = 0.0;          // harmonics beyond the noise, relative to the tone
+  double drift_per_s = 0.0;         // of the output, its unit per second
+  double samples = 0.0;             // that the estimate was made from
+  double lost = 0.0;                // that were missing among them
+  double seconds = 0.0;             // bench time of the dwell
 };
 
 // Per-block coefficients of one channel at one tone.
@@ -78,7 +92,6 @@ struct DwellTiming {
   std::uint64_t first_tick = 0;
   std::uint64_t ticks = 0;    // executed
   std::uint64_t skipped = 0;  // not executed
-  std::uint32_t voided_blocks = 0;
   std::uint32_t resettles = 0;
   std::int64_t max_lateness_ns = 0;
   std::array<std::uint32_t, bins>

@@ -18,6 +18,19 @@ std::size_t most_tones(const SweepPlan& plan) {
   return most;
 }
 
+std::size_t most_bins(const SweepPlan& plan) {
+  std::size_t most = 1;
+  for (const Dwell& dwell : plan.dwells) most = std::max(most, dwell.bins());
+  return most;
+}
+
+// Every sensor over what was applied.
+Pairs over_applied(std::size_t sensors) {
+  Pairs pairs;
+  for (std::size_t i = 0; i < sensors; ++i) pairs.push_back({.input = 0, .output = 1 + i});
+  return pairs;
+}
+
 double largest_amplitude(const Dwell& dwell) {
   double largest = 0.0;
   for (const Tone& tone : dwell.tones) largest = std::max(largest, tone.amplitude);
@@ -46,10 +59,10 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       sensors_{sensors.begin(), sensors.end()},
       guard_{guard},
       sink_{sink},
-      excitation_{most_tones(plan_)},
-      correlator_{applied_channel + sensors.size(), most_tones(plan_)},
-      estimators_(most_tones(plan_) * sensors.size()),
-      values_(first_sensor_channel + sensors.size()),
+      excitation_{most_tones(plan_), most_bins(plan_)},
+      measurement_{1 + sensors.size(),           most_bins(plan_), most_tones(plan_),
+                   over_applied(sensors.size()), plan_.judgement,  plan_.rate_hz},
+      observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
       range_faults_(sensors.size()) {}
 
@@ -77,10 +90,9 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool first = outcome_.ticks == 0;
   const std::uint64_t ticks = first ? 1 : tick.index - last_tick_;
 
-  const bool new_dwell = first || dwell_ticks_ == 0;
-  if (new_dwell) begin_dwell(last_tick_ + (first ? 0 : 1));
-  const std::uint64_t phase_ticks = new_dwell ? ticks - 1 : ticks;
-  excitation_.advance(phase_ticks);
+  const bool new_dwell = dwell_ticks_ == 0;
+  if (new_dwell) begin_dwell(first ? 0 : last_tick_ + 1);
+  excitation_.advance(new_dwell ? ticks - 1 : ticks);
   dwell_ticks_ += ticks;
   account(tick, ticks);
 
@@ -88,46 +100,57 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (stop_requests > 0) {
     guard_.stop(TripCause::stop_requested, tick.index, stop_requests > 1);
   }
-  exchange(guard_.admit(plan_.offset + excitation_.command(), tick.index, ticks), tick.index);
+  command_ = guard_.admit(plan_.offset + excitation_.command(), tick.index, ticks);
+  exchange(command_, tick);
   control.tick.store(tick.index, std::memory_order_relaxed);
   control.dwell.store(dwell_, std::memory_order_relaxed);
 
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
-    finish_dwell(tick.index);
+    measurement_.conclude();
+    finish_dwell();
     return false;
   }
-  measure(tick.index, ticks);
+  const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
+  const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
+  measure(tick.index, ticks > 1 || late || command_lost_);
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
   return dwell_ < plan_.dwells.size();
 }
 
 // Write, then read, in the same tick; the guard sees all of it.
-void SweepRunner::exchange(double command, std::uint64_t tick) noexcept {
+void SweepRunner::exchange(double command, const Tick& tick) noexcept {
+  const std::int64_t tick_ns = clock_.time_ns({.tick = tick.index});
+  const auto observe = [&](std::size_t channel, const Sample& sample) {
+    observations_[channel] = {.value = sample.value,
+                              .offset_ns = sample.time_ns - tick_ns,
+                              .missing = sample.fault != Fault::none};
+  };
   const Sample applied = actuator_.write(command);
-  guard_.observe_write(applied, tick);
-  command_disturbed_ = applied.fault != Fault::none;
-  if (command_disturbed_) {
-    announce(
-        {.kind = EventKind::actuator_fault, .fault = applied.fault, .dwell = dwell_, .tick = tick});
+  guard_.observe_write(applied, tick.index);
+  observe(0, applied);
+  command_lost_ = applied.fault != Fault::none;
+  if (command_lost_) {
+    announce({.kind = EventKind::actuator_fault,
+              .fault = applied.fault,
+              .dwell = dwell_,
+              .tick = tick.index});
   }
-  values_[command_channel] = command;
-  values_[applied_channel] = applied.value;
-
-  const std::int64_t now_ns = clock_.time_ns(clock_.now());
-  sensors_complete_ = true;
+  const std::int64_t now_ns = tick_ns + tick.lateness.count();
   for (std::size_t i = 0; i < sensors_.size(); ++i) {
     const Sample sample = sensors_[i]->read();
-    guard_.observe(static_cast<std::uint32_t>(i), sample, now_ns, tick);
-    note_sensor(i, sample, tick);
-    sensors_complete_ = sensors_complete_ && sample.fault == Fault::none;
-    values_[first_sensor_channel + i] = sample.value;
+    guard_.observe(static_cast<std::uint32_t>(i), sample, now_ns, tick.index);
+    note_sensor(i, sample, tick.index);
+    observe(1 + i, sample);
   }
-
   if (settings_.record_samples) {
-    TickSamples samples{
-        .tick = tick, .dwell = dwell_, .channels = static_cast<std::uint32_t>(values_.size())};
-    std::copy(values_.begin(), values_.end(), samples.values.begin());
+    TickSamples samples{.tick = tick.index,
+                        .dwell = dwell_,
+                        .channels = static_cast<std::uint32_t>(first_sensor_channel + sensors_.size())};
+    samples.values[command_channel] = command;
+    for (std::size_t i = 0; i < observations_.size(); ++i) {
+      samples.values[applied_channel + i] = observations_[i].value;
+    }
     sink_.put_sample(samples);
   }
 }
@@ -147,105 +170,75 @@ void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
   sensor_faults_[sensor] = sample.fault;
 }
 
-// A late or lost command has disturbed the plant: settle again. A lost sensor sample has not: only
-// its block is void.
-void SweepRunner::measure(std::uint64_t tick, std::uint64_t ticks) noexcept {
+// A late or lost command has disturbed the plant: what was gathered is void, wait again. A lost
+// sensor sample has not: it leaves the regression.
+void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
   const Dwell& dwell = plan_.dwells[dwell_];
-  if (ticks > 1 || command_disturbed_) settle_again();
-
-  if (phase_ == Phase::settling) {
-    if (settle_left_ > 0) --settle_left_;
-    if (settle_left_ == 0) {
-      phase_ = Phase::measuring;
-      correlator_.start(dwell.tones.size(), dwell.block_samples);
-    }
-  } else if (!sensors_complete_) {
-    ++timing_.voided_blocks;
-    correlator_.start(dwell.tones.size(), dwell.block_samples);
+  if (disturbed) {
+    ++timing_.resettles;
+    settle_left_ = std::max(settle_left_, dwell.settle_samples);
+    measurement_.disturb();
+  } else if (settle_left_ > 0) {
+    --settle_left_;
   } else {
-    correlator_.add(excitation_.phasors(),
-                    std::span<const double>{values_}.subspan(applied_channel));
-    if (correlator_.full()) finish_block(tick);
+    measurement_.add(excitation_.phasors(), observations_);
+    if (measurement_.block_ended()) put_block(tick);
   }
-
-  const bool complete = blocks_done_ == dwell.blocks;
-  const bool given_up = dwell_ticks_ >= max_dwell_stretch * dwell.samples();
-  if (complete || given_up) {
-    finish_dwell(tick);
-    ++dwell_;
-    ++outcome_.dwells_done;
-  }
+  given_up_ = dwell_ticks_ >= max_dwell_stretch * dwell.max_samples;
+  if (!measurement_.done() && !given_up_) return;
+  measurement_.conclude();
+  finish_dwell();
+  ++dwell_;
+  ++outcome_.dwells_done;
 }
 
 void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
   const Dwell& dwell = plan_.dwells[dwell_];
   const double amplitude_before = dwell_ == 0 ? 0.0 : largest_amplitude(plan_.dwells[dwell_ - 1]);
   excitation_.start(dwell, amplitude_before / largest_amplitude(dwell));
-  phase_ = Phase::settling;
+  measurement_.start(dwell);
   settle_left_ = dwell.settle_samples;
-  blocks_done_ = 0;
+  blocks_ = 0;
+  given_up_ = false;
   timing_ = {.dwell = dwell_, .first_tick = tick};
-  for (ResponseEstimator& each : estimators_) each.reset();
   std::fill(range_faults_.begin(), range_faults_.end(), 0);
-  if (settle_left_ == 0) {
-    phase_ = Phase::measuring;
-    correlator_.start(dwell.tones.size(), dwell.block_samples);
-  }
   announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
 }
 
-void SweepRunner::settle_again() noexcept {
-  const Dwell& dwell = plan_.dwells[dwell_];
-  if (phase_ == Phase::measuring) ++timing_.voided_blocks;
-  ++timing_.resettles;
-  phase_ = Phase::settling;
-  settle_left_ = std::max(settle_left_, std::max(dwell.settle_samples, dwell.block_samples));
-}
-
-void SweepRunner::finish_block(std::uint64_t tick) noexcept {
+void SweepRunner::put_block(std::uint64_t tick) noexcept {
   const Dwell& dwell = plan_.dwells[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
-    const auto input = coefficients(applied_channel, tone).phasor();
-    for (std::size_t i = 0; i < sensors_.size(); ++i) {
-      const auto output = coefficients(first_sensor_channel + i, tone).phasor();
-      estimator(tone, i).add(output, input);
-    }
-    for (std::size_t channel = applied_channel; channel < values_.size(); ++channel) {
+    for (std::size_t channel = 0; channel < observations_.size(); ++channel) {
       sink_.put(Block{.dwell = dwell_,
-                      .block = blocks_done_,
+                      .block = blocks_,
                       .tone = static_cast<std::uint16_t>(tone),
-                      .channel = static_cast<std::uint16_t>(channel),
+                      .channel = static_cast<std::uint16_t>(applied_channel + channel),
                       .first_tick = tick + 1 - dwell.block_samples,
-                      .coefficients = coefficients(channel, tone)});
+                      .coefficients = measurement_.block_coefficients(channel, tone)});
     }
   }
-  ++blocks_done_;
-  correlator_.start(dwell.tones.size(), dwell.block_samples);
+  ++blocks_;
 }
 
-void SweepRunner::finish_dwell(std::uint64_t /*tick*/) noexcept {
+void SweepRunner::finish_dwell() noexcept {
   const Dwell& dwell = plan_.dwells[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
-    for (std::size_t i = 0; i < sensors_.size(); ++i) sink_.put(make_point(tone, i));
+    for (std::size_t pair = 0; pair < measurement_.pairs().size(); ++pair) {
+      sink_.put(make_point(pair, tone));
+    }
   }
   sink_.put(timing_);
   outcome_.skipped_ticks += timing_.skipped;
   dwell_ticks_ = 0;
 }
 
-Point SweepRunner::make_point(std::size_t tone, std::size_t sensor) const noexcept {
+Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept {
   const Dwell& dwell = plan_.dwells[dwell_];
-  const ResponseEstimator& estimate = estimators_[tone * sensors_.size() + sensor];
-  Point point{.dwell = dwell_,
-              .tone = static_cast<std::uint16_t>(tone),
-              .output = static_cast<std::uint16_t>(first_sensor_channel + sensor),
-              .frequency_hz = dwell.tone_hz(dwell.tones[tone], plan_.rate_hz),
-              .response = estimate.response(),
-              .covariance = estimate.covariance(),
-              .input_amplitude = std::abs(estimate.input()),
-              .output_amplitude = std::abs(estimate.output()),
-              .blocks = estimate.blocks()};
+  Point point = measurement_.point(pair, tone);
+  point.dwell = dwell_;
+  point.seconds = static_cast<double>(dwell_ticks_) / plan_.rate_hz;
   const double excitation = point.input_amplitude / dwell.tones[tone].amplitude;
+  const auto sensor = static_cast<std::size_t>(point.output - first_sensor_channel);
   const auto mark = [&](PointStatus status, PointReason reason, double value) {
     point.status = status;
     point.reason = reason;
@@ -253,9 +246,9 @@ Point SweepRunner::make_point(std::size_t tone, std::size_t sensor) const noexce
   };
   if (guard_.trip().tripped()) {
     mark(PointStatus::stopped, PointReason::guard_trip, 0.0);
-  } else if (blocks_done_ < dwell.blocks) {
-    mark(PointStatus::rt_fault, PointReason::gaps, timing_.resettles + timing_.voided_blocks);
-  } else if (excitation < settings_.min_excitation) {
+  } else if (given_up_) {
+    mark(PointStatus::rt_fault, PointReason::gaps, timing_.resettles);
+  } else if (!(excitation >= settings_.min_excitation)) {
     mark(PointStatus::low_signal, PointReason::no_excitation, excitation);
   } else if (range_faults_[sensor] > 0) {
     const auto ticks = static_cast<double>(timing_.ticks);

@@ -8,10 +8,9 @@
 
 #include "drivers/driver.h"
 #include "sweep/clock.h"
-#include "sweep/correlator.h"
-#include "sweep/estimator.h"
 #include "sweep/excitation.h"
 #include "sweep/guard.h"
+#include "sweep/measurement.h"
 #include "sweep/plan.h"
 #include "sweep/records.h"
 
@@ -27,6 +26,7 @@ struct RunControl {
 struct RunnerSettings {
   bool record_samples = false;
   double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
+  double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
 };
 
 struct RunOutcome {
@@ -48,26 +48,16 @@ class SweepRunner {
   RunOutcome run(RunControl& control) noexcept;
 
  private:
-  enum class Phase : std::uint8_t { settling, measuring };
-
   bool step(RunControl& control) noexcept SINERIG_NONBLOCKING;
-  void exchange(double command, std::uint64_t tick) noexcept SINERIG_NONBLOCKING;
-  void measure(std::uint64_t tick, std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
+  void exchange(double command, const Tick& tick) noexcept SINERIG_NONBLOCKING;
+  void measure(std::uint64_t tick, bool disturbed) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
-  void settle_again() noexcept;
-  void finish_block(std::uint64_t tick) noexcept;
-  void finish_dwell(std::uint64_t tick) noexcept;
-  Point make_point(std::size_t tone, std::size_t sensor) const noexcept;
+  void put_block(std::uint64_t tick) noexcept;
+  void finish_dwell() noexcept;
+  Point make_point(std::size_t pair, std::size_t tone) const noexcept;
   void account(const Tick& tick, std::uint64_t ticks) noexcept;
   void note_sensor(std::size_t sensor, const Sample& sample, std::uint64_t tick) noexcept;
   void announce(const Event& event) noexcept { sink_.put(event); }
-  // The command itself is known; the correlator holds the channels from `applied` on.
-  Coefficients coefficients(std::size_t channel, std::size_t tone) const noexcept {
-    return correlator_.coefficients(channel - applied_channel, tone);
-  }
-  ResponseEstimator& estimator(std::size_t tone, std::size_t sensor) noexcept {
-    return estimators_[tone * sensors_.size() + sensor];
-  }
 
   SweepPlan plan_;
   RunnerSettings settings_;
@@ -78,19 +68,18 @@ class SweepRunner {
   RecordSink& sink_;
 
   Excitation excitation_;
-  Correlator correlator_;
-  std::vector<ResponseEstimator> estimators_;  // per tone and sensor
-  std::vector<double> values_;                 // command, applied, sensors: this tick
-  std::vector<Fault> sensor_faults_;           // of the last tick
-  std::vector<std::uint64_t> range_faults_;    // per sensor, this dwell
+  Measurement measurement_;
+  std::vector<Observation> observations_;    // applied, sensors: this tick
+  double command_ = 0.0;                     // this tick
+  std::vector<Fault> sensor_faults_;         // of the last tick
+  std::vector<std::uint64_t> range_faults_;  // per sensor, this dwell
 
   std::uint32_t dwell_ = 0;
-  Phase phase_ = Phase::settling;
+  std::uint32_t blocks_ = 0;
   std::uint64_t settle_left_ = 0;
-  std::uint64_t dwell_ticks_ = 0;  // grid ticks since the dwell began
-  std::uint32_t blocks_done_ = 0;
-  bool command_disturbed_ = false;  // this tick's command was late or lost
-  bool sensors_complete_ = true;    // this tick has a good sample of every sensor
+  std::uint64_t dwell_ticks_ = 0;  // grid ticks since the dwell began; 0: it has to begin
+  bool given_up_ = false;
+  bool command_lost_ = false;
   DwellTiming timing_;
   std::uint64_t last_tick_ = 0;
   RunOutcome outcome_;

@@ -41,9 +41,15 @@ CoherentFrequency snap(double frequency_hz, double rate_hz, double relative_tole
 }
 
 Phasor phasor(std::uint64_t index, std::uint64_t samples) noexcept {
-  // Eighths of a turn: 8·index = octant·samples + rest.
-  const std::uint64_t octant = 8 * index / samples;
-  const std::uint64_t rest = 8 * index - octant * samples;
+  // Eighths of a turn: 8·index = octant·samples + rest, by comparing, which beats a division.
+  std::uint64_t rest = 8 * index;
+  std::uint64_t octant = 0;
+  for (const std::uint64_t step : {4U, 2U, 1U}) {
+    if (rest >= step * samples) {
+      rest -= step * samples;
+      octant += step;
+    }
+  }
   const bool odd = (octant & 1) != 0;
   const std::uint64_t folded = odd ? samples - rest : rest;
   const double angle =

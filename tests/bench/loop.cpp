@@ -28,6 +28,9 @@ SweepPlan one_decade() {
   sweep.stop_hz = 100.0;
   sweep.points = 20;
   sweep.amplitude = 1.0;
+  sweep.settling = Settling::fixed;
+  sweep.target_db = 0.0;
+  sweep.target_deg = 0.0;
   sweep.integrate = {.cycles = 8.0, .seconds = 10.0};
   return plan_sweep(sweep, {}, rate_hz);
 }

@@ -23,6 +23,9 @@ SweepSettings sweep_of_the_band(double rate_hz, double settle_s) {
   sweep.stop_hz = 0.45 * rate_hz;
   sweep.points = 40;
   sweep.amplitude = 0.7;
+  sweep.settling = Settling::fixed;
+  sweep.target_db = 0.0;
+  sweep.target_deg = 0.0;
   sweep.settle = {.cycles = 2.0, .seconds = settle_s};
   sweep.integrate = {.cycles = 2.0, .seconds = 0.1};
   return sweep;

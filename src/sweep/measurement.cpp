@@ -1,0 +1,295 @@
+#include "sweep/measurement.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "sweep/student.h"
+
+namespace sinerig {
+
+namespace {
+
+constexpr double db_per_relative = 20.0 / std::numbers::ln10;
+constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
+
+// Checkpoints of a dwell: enough to drop a quarter of a short window, few enough to keep.
+constexpr std::size_t max_checkpoints = 65;
+
+// Clusters of a window: more would only shorten them against the correlation of the noise.
+constexpr std::size_t most_clusters = 16;
+
+// The late half of a settled window strays from the whole by chance: allowed in standard errors.
+constexpr double settling_sigmas = 1.5;
+
+// … and by this part of the target whatever the noise.
+constexpr double settling_part_of_target = 0.2;
+
+// The tolerance of settling where no target sets one.
+constexpr double default_settling_tolerance = 1e-3;
+
+// One cluster this much louder than the others is a burst, if it also stands out statistically.
+constexpr double burst_ratio = 6.0;
+
+}  // namespace
+
+Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t max_tones,
+                         Pairs pairs, Judgement judgement, double rate_hz)
+    : pairs_{std::move(pairs)},
+      judgement_{judgement},
+      rate_hz_{rate_hz},
+      max_tones_{max_tones},
+      regression_{channels, max_bins, max_checkpoints},
+      estimator_{max_bins},
+      memories_(pairs_.size()),
+      results_(pairs_.size() * max_tones),
+      estimates_(max_tones),
+      omega_(max_bins) {}
+
+void Measurement::start(const Dwell& dwell) noexcept {
+  dwell_ = &dwell;
+  const double per_cycle = 2.0 * std::numbers::pi * rate_hz_ / static_cast<double>(dwell.block_samples);
+  const std::size_t tones = dwell.tones.size();
+  for (std::size_t bin = 0; bin < dwell.bins(); ++bin) {
+    const std::uint64_t cycles = bin < tones ? dwell.tones[bin].cycles
+                                             : dwell.tones[0].cycles * (bin - tones + 2);
+    omega_[bin] = per_cycle * static_cast<double>(cycles);
+  }
+  regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
+                    static_cast<double>(dwell.block_samples));
+  std::fill(results_.begin(), results_.end(), Result{});
+  restart();
+}
+
+void Measurement::restart() noexcept {
+  samples_ = 0;
+  part_ = 0;
+  in_block_ = 0;
+  first_ = 0;
+  stride_ = 1;
+  block_complete_ = true;
+  block_ended_ = false;
+  settled_ = judgement_.settling == Settling::fixed;
+  done_ = false;
+  regression_.begin_block();
+}
+
+void Measurement::disturb() noexcept {
+  regression_.forget();
+  restart();
+}
+
+void Measurement::add(std::span<const Phasor> phasors,
+                      std::span<const Observation> observations) noexcept {
+  if (block_ended_) {
+    block_ended_ = false;
+    block_complete_ = true;
+    regression_.begin_block();
+  }
+  regression_.add(phasors, observations);
+  for (const Observation& each : observations) block_complete_ = block_complete_ && !each.missing;
+  ++samples_;
+  ++in_block_;
+  // Part k of a block ends at the sample nearest below (k + 1) / parts of it.
+  if (in_block_ * dwell_->parts >= (part_ + 1) * dwell_->block_samples) end_part();
+}
+
+void Measurement::end_part() noexcept {
+  ++part_;
+  const bool kept = regression_.checkpoint();
+  if (in_block_ == dwell_->block_samples) {
+    part_ = 0;
+    in_block_ = 0;
+    block_ended_ = block_complete_;
+    if (!block_complete_) {
+      block_complete_ = true;
+      regression_.begin_block();
+    }
+  }
+  if (kept) judge();
+  if (samples_ + dwell_->settle_samples >= dwell_->max_samples && !done_) {
+    conclude();
+    done_ = true;
+  }
+}
+
+Window Measurement::current_window() noexcept {
+  while (stride_ < regression_.stride()) {
+    stride_ *= 2;
+    first_ = (first_ + 1) / 2;
+  }
+  const std::size_t last = regression_.checkpoints() - 1;
+  const std::size_t per_block = std::max<std::size_t>(1, dwell_->parts / stride_);
+  const std::size_t blocks = (last - first_) / per_block;
+  const std::size_t merged = (blocks + most_clusters - 1) / most_clusters;
+  return {.first = first_, .last = last, .cluster = per_block * std::max<std::size_t>(1, merged)};
+}
+
+bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {
+  const std::size_t tones = dwell_->tones.size();
+  const bool solved = estimator_.estimate(regression_, window, pairs_[pair],
+                                          {omega_.data(), dwell_->bins()}, {estimates_.data(), tones});
+  for (std::size_t tone = 0; tone < tones; ++tone) {
+    Result& each = result(pair, tone);
+    each.known = solved;
+    if (!solved) continue;
+    each.estimate = estimates_[tone];
+    each.variance = memories_[pair].pooled(each.estimate, omega_[tone] / (2.0 * std::numbers::pi));
+  }
+  return solved;
+}
+
+double Measurement::settling_tolerance() const noexcept {
+  const double gain = judgement_.target_db / db_per_relative;
+  const double phase = judgement_.target_deg / degrees_per_radian;
+  if (gain > 0.0 && phase > 0.0) return settling_part_of_target * std::min(gain, phase);
+  if (judgement_.has_target()) return settling_part_of_target * std::max(gain, phase);
+  return default_settling_tolerance;
+}
+
+// Hausman's test: were the window free of the transient, its late half would differ from the whole
+// only by the noise that the early half takes out.
+bool Measurement::late_half_agrees(const Window& window) noexcept {
+  Window late = window;
+  late.first = window.first + (window.last - window.first + 1) / 2;
+  const std::size_t tones = dwell_->tones.size();
+  if (!estimator_.estimate(regression_, late, pairs_[0], {omega_.data(), dwell_->bins()},
+                           {estimates_.data(), tones})) {
+    return false;
+  }
+  bool agrees = true;
+  for (std::size_t tone = 0; tone < tones; ++tone) {
+    Result& whole = result(0, tone);
+    const double gain = std::abs(whole.estimate.response);
+    const double white = whole.estimate.white.mean_variance();
+    const double variance = whole.variance.covariance.mean_variance();
+    const double colour = white > 0.0 ? variance / white : 1.0;
+    const double late_variance = estimates_[tone].white.mean_variance() * colour;
+    const double excess = std::max(0.0, late_variance - variance);
+    whole.late_shift = std::abs(estimates_[tone].response - whole.estimate.response) / gain;
+    whole.late_noise = std::sqrt(2.0 * excess) / gain;
+    const double allowed = std::max(settling_tolerance(), settling_sigmas * std::sqrt(excess) / gain);
+    agrees = agrees && whole.late_shift <= allowed;
+  }
+  return agrees;
+}
+
+Interval Measurement::interval(const Result& result) const noexcept {
+  const std::complex<double> response = result.estimate.response;
+  const double square = std::norm(response);
+  const Covariance2& c = result.variance.covariance;
+  const double re = response.real();
+  const double im = response.imag();
+  // Variances along and across H, relative to it.
+  const double along = (re * re * c.re_re + 2.0 * re * im * c.re_im + im * im * c.im_im) / square / square;
+  const double across = (im * im * c.re_re - 2.0 * re * im * c.re_im + re * re * c.im_im) / square / square;
+  const double t = student_t_975(result.variance.dof);
+  // What the transient may have left: the shift of the late half beyond its noise.
+  const double left = std::max(0.0, result.late_shift * result.late_shift -
+                                        result.late_noise * result.late_noise);
+  return {.gain_db = db_per_relative * std::sqrt(t * t * along + left),
+          .phase_deg = degrees_per_radian * std::sqrt(t * t * across + left)};
+}
+
+bool Measurement::target_met() const noexcept {
+  for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
+    const Result& each = result(0, tone);
+    if (each.variance.dof == 0.0) return false;
+    const Interval half = interval(each);
+    if (judgement_.target_db > 0.0 && !(half.gain_db <= judgement_.target_db)) return false;
+    if (judgement_.target_deg > 0.0 && !(half.phase_deg <= judgement_.target_deg)) return false;
+  }
+  return true;
+}
+
+void Measurement::judge() noexcept {
+  const Window window = current_window();
+  const std::uint64_t length = regression_.samples_at(window.last) - regression_.samples_at(window.first);
+  if (length < dwell_->blocks * dwell_->block_samples) return;
+  if (!evaluate(0, window)) return;
+  if (judgement_.settling == Settling::detect) {
+    settled_ = late_half_agrees(window);
+    if (!settled_) {
+      first_ += (window.last - window.first + 3) / 4;
+      return;
+    }
+  }
+  if (judgement_.has_target() && !target_met()) return;
+  conclude();
+  done_ = true;
+}
+
+void Measurement::conclude() noexcept {
+  if (dwell_ == nullptr || done_) return;
+  const Window window = current_window();
+  if (window.last == window.first) return;
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    if (!evaluate(pair, window)) continue;
+    for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
+      Result& each = result(pair, tone);
+      // A pair that settling is not judged on shares the verdict of the one that it is.
+      each.late_shift = result(0, tone).late_shift;
+      each.late_noise = result(0, tone).late_noise;
+      memories_[pair].learn(each.estimate, omega_[tone] / (2.0 * std::numbers::pi));
+    }
+  }
+}
+
+Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const Result& each = result(pair, tone);
+  const Estimate& estimate = each.estimate;
+  Point point;
+  point.tone = static_cast<std::uint16_t>(tone);
+  point.input = static_cast<std::uint16_t>(applied_channel + pairs_[pair].input);
+  point.output = static_cast<std::uint16_t>(applied_channel + pairs_[pair].output);
+  point.frequency_hz = omega_[tone] / (2.0 * std::numbers::pi);
+  if (!each.known) {
+    point.response = {nan, nan};
+    point.covariance = {nan, nan, nan};
+    point.gain_interval_db = nan;
+    point.phase_interval_deg = nan;
+    return point;
+  }
+  const Interval half = interval(each);
+  const double gain = std::abs(estimate.response);
+  point.response = estimate.response;
+  point.covariance = each.variance.covariance;
+  point.dof = each.variance.dof;
+  point.gain_interval_db = half.gain_db;
+  point.phase_interval_deg = half.phase_deg;
+  point.input_amplitude = std::abs(estimate.input);
+  point.output_amplitude = std::abs(estimate.output);
+  point.snr_db = 20.0 * std::log10(point.output_amplitude / std::numbers::sqrt2 / estimate.residual_rms);
+  point.distortion = estimate.distortion;
+  point.drift_per_s = estimate.drift_per_sample / static_cast<double>(dwell_->block_samples) * rate_hz_;
+  point.samples = estimate.samples;
+  point.lost = estimate.lost;
+  const double loud = estimate.burst - 1.0;
+  const double samples_per_cluster = estimate.samples / (0.5 * estimate.scatter_dof + 1.0);
+  // Above this the residual is the rounding of the arithmetic, which has no statistics.
+  const bool real_noise = point.snr_db < 140.0;
+  const bool burst = real_noise && estimate.burst > burst_ratio && loud > 8.0 * std::sqrt(2.0 / samples_per_cluster);
+  const auto mark = [&](PointStatus status, PointReason reason, double value) {
+    point.status = status;
+    point.reason = reason;
+    point.reason_value = value;
+  };
+  if (point.output_amplitude == 0.0 && estimate.residual_rms == 0.0) {
+    mark(PointStatus::low_signal, PointReason::stuck, 0.0);
+  } else if (!settled_) {
+    mark(PointStatus::unsettled, PointReason::still_moving, db_per_relative * each.late_shift);
+  } else if (burst) {
+    mark(PointStatus::low_signal, PointReason::noise_burst, estimate.burst);
+  } else if (estimate.distortion > judgement_.max_distortion) {
+    mark(PointStatus::distorted, PointReason::harmonics, estimate.distortion);
+  } else if (pair == 0 && judgement_.has_target() && !target_met()) {
+    mark(PointStatus::low_signal, PointReason::target_not_reached, half.gain_db);
+  } else if (!(gain > 0.0)) {
+    mark(PointStatus::low_signal, PointReason::no_response, 0.0);
+  }
+  return point;
+}
+
+}  // namespace sinerig

@@ -1,0 +1,104 @@
+// One dwell, from its first tick to its points: accumulate, see the transient go, go on until the
+// intervals meet the target, say how good it is. Pure functions of samples: a virtual run is
+// deterministic to the bit.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sweep/estimator.h"
+#include "sweep/noise_memory.h"
+#include "sweep/nonblocking.h"
+#include "sweep/plan.h"
+#include "sweep/records.h"
+#include "sweep/regression.h"
+
+namespace sinerig {
+
+// Half widths of the 95 % intervals of gain and phase.
+struct Interval {
+  double gain_db = 0.0;
+  double phase_deg = 0.0;
+};
+
+// A pair of regression channels (0 is what was applied, 1… the sensors) whose ratio is a response.
+// The first pair is the one that settling and targets are judged on.
+using Pairs = std::vector<Pair>;
+
+class Measurement {
+ public:
+  // Takes all memory for dwells of up to `max_bins` bins.
+  Measurement(std::size_t channels, std::size_t max_bins, std::size_t max_tones, Pairs pairs,
+              Judgement judgement, double rate_hz);
+
+  void start(const Dwell& dwell) noexcept SINERIG_NONBLOCKING;
+
+  // One tick after the wait.
+  void add(std::span<const Phasor> phasors,
+           std::span<const Observation> observations) noexcept SINERIG_NONBLOCKING;
+
+  // The command was late or lost: what has been gathered is void.
+  void disturb() noexcept SINERIG_NONBLOCKING;
+
+  // The dwell has been measured as far as it will be.
+  bool done() const noexcept { return done_; }
+
+  // A complete block of whole cycles has ended with the last add(); its plain sums.
+  bool block_ended() const noexcept { return block_ended_; }
+  Coefficients block_coefficients(std::size_t channel, std::size_t tone) const noexcept {
+    return regression_.block_coefficients(channel, tone, static_cast<double>(dwell_->block_samples));
+  }
+
+  // Takes the judgement as it stands, for the end of the dwell or a stop in the midst of it.
+  void conclude() noexcept SINERIG_NONBLOCKING;
+  Point point(std::size_t pair, std::size_t tone) const noexcept SINERIG_NONBLOCKING;
+  const Pairs& pairs() const noexcept { return pairs_; }
+
+ private:
+  struct Result {
+    Estimate estimate{};
+    PooledVariance variance{};
+    double late_shift = 0.0;  // |H of the late half − H| / |H|
+    double late_noise = 0.0;  // its rms were there no transient
+    bool known = false;
+  };
+
+  void judge() noexcept;
+  Interval interval(const Result& result) const noexcept;
+  void restart() noexcept;
+  void end_part() noexcept;
+  Window current_window() noexcept;
+  bool evaluate(std::size_t pair, const Window& window) noexcept;
+  bool late_half_agrees(const Window& window) noexcept;
+  bool target_met() const noexcept;
+  double settling_tolerance() const noexcept;
+  Result& result(std::size_t pair, std::size_t tone) noexcept { return results_[pair * max_tones_ + tone]; }
+  const Result& result(std::size_t pair, std::size_t tone) const noexcept {
+    return results_[pair * max_tones_ + tone];
+  }
+
+  Pairs pairs_;
+  Judgement judgement_;
+  double rate_hz_;
+  std::size_t max_tones_;
+  Regression regression_;
+  WindowEstimator estimator_;
+  std::vector<NoiseMemory> memories_;  // per pair
+  std::vector<Result> results_;        // per pair and tone
+  std::vector<Estimate> estimates_;    // of the window under evaluation
+  std::vector<double> omega_;          // per bin
+
+  const Dwell* dwell_ = nullptr;
+  std::uint64_t samples_ = 0;  // since the start or the last disturbance
+  std::uint32_t part_ = 0;     // within the block
+  std::uint64_t in_block_ = 0;
+  std::size_t first_ = 0;      // checkpoint at which the window under judgement begins
+  std::size_t stride_ = 1;     // of the regression when first_ was set
+  bool block_complete_ = true;
+  bool block_ended_ = false;
+  bool settled_ = false;
+  bool done_ = false;
+};
+
+}  // namespace sinerig

@@ -1,0 +1,41 @@
+// What earlier dwells have taught about the colour of the noise: how far the scatter at the tone
+// lies above or below what a white residual would give. Few blocks then suffice for an honest
+// interval.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "sweep/estimator.h"
+#include "sweep/nonblocking.h"
+
+namespace sinerig {
+
+// A variance and the degrees of freedom behind it.
+struct PooledVariance {
+  Covariance2 covariance{};  // of H
+  double dof = 0.0;          // 0: nothing is known yet
+};
+
+class NoiseMemory {
+ public:
+  // The variance of H at this frequency, from the clusters of the window and the memory together.
+  PooledVariance pooled(const Estimate& estimate, double frequency_hz) const noexcept
+      SINERIG_NONBLOCKING;
+
+  // Takes in a finished dwell.
+  void learn(const Estimate& estimate, double frequency_hz) noexcept SINERIG_NONBLOCKING;
+
+ private:
+  struct Lesson {
+    double log_frequency = 0.0;
+    double colour = 1.0;  // scatter / white
+    double dof = 0.0;
+  };
+
+  static constexpr std::size_t capacity = 32;
+  std::array<Lesson, capacity> lessons_{};
+  std::size_t next_ = 0;
+};
+
+}  // namespace sinerig
