@@ -115,7 +115,8 @@ Json timing_json(const StoredRun& run) {
 
 void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response) {
   stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im,dof,gain_interval_db,"
-            "phase_interval_deg,input_amplitude,output_amplitude,snr_db,distortion,drift_per_s,samples,"
+            "phase_interval_deg,input_amplitude,output_amplitude,snr_db,distortion,drift_per_s,"
+            "samples,"
             "lost,seconds,status,reason,reason_value,input,output\n";
   const std::vector<double> phase = unwrapped_phase(response.points);
   for (std::size_t i = 0; i < response.points.size(); ++i) {
@@ -128,9 +129,9 @@ void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse&
           point.drift_per_s, point.samples, point.lost, point.seconds}) {
       stream << field(value) << ',';
     }
-    stream << point.status << ',' << point.reason << ','
-           << field(point.reason_value) << ',' << run.channels.at(point.input).name << ','
-           << run.channels.at(point.output).name << '\n';
+    stream << point.status << ',' << point.reason << ',' << field(point.reason_value) << ','
+           << run.channels.at(point.input).name << ',' << run.channels.at(point.output).name
+           << '\n';
   }
 }
 

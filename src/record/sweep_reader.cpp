@@ -56,11 +56,12 @@ SweepPlan read_plan(Database& database, double rate_hz) {
 
 std::vector<StoredResponse> read_responses(Database& database) {
   std::vector<StoredResponse> responses;
-  Statement rows{database,
-                 "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, dof, "
-                 "gain_interval_db, phase_interval_deg, input_amplitude, output_amplitude, snr_db, "
-                 "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value "
-                 "FROM point ORDER BY input, output, freq_hz, dwell"};
+  Statement rows{
+      database,
+      "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, dof, "
+      "gain_interval_db, phase_interval_deg, input_amplitude, output_amplitude, snr_db, "
+      "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value "
+      "FROM point ORDER BY input, output, freq_hz, dwell"};
   while (rows.step()) {
     StoredPoint point{.dwell = whole<std::uint32_t>(rows, 0),
                       .tone = whole<std::uint32_t>(rows, 1),

@@ -140,7 +140,8 @@ void SweepWriter::write_plan(const SweepPlan& plan) {
   for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
     const Dwell& dwell = plan.dwells[i];
     insert_dwell
-        .bind(i, dwell.asked_hz, dwell.block_samples, dwell.ramp_samples, dwell.settle_samples, dwell.blocks, dwell.max_samples)
+        .bind(i, dwell.asked_hz, dwell.block_samples, dwell.ramp_samples, dwell.settle_samples,
+              dwell.blocks, dwell.max_samples)
         .run();
     for (std::size_t k = 0; k < dwell.tones.size(); ++k) {
       const Tone& tone = dwell.tones[k];
@@ -176,7 +177,8 @@ void SweepWriter::insert(const Block& block) {
 
 void SweepWriter::insert(const DwellTiming& timing) {
   statements_->timing
-      .bind(timing.dwell, timing.first_tick, timing.ticks, timing.skipped, timing.resettles, timing.max_lateness_ns, histogram_text(timing))
+      .bind(timing.dwell, timing.first_tick, timing.ticks, timing.skipped, timing.resettles,
+            timing.max_lateness_ns, histogram_text(timing))
       .run();
 }
 

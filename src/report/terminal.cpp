@@ -63,7 +63,8 @@ std::string duration_text(double seconds) {
 
 std::string bench_time_text(const SweepPlan& plan) {
   const std::string least = duration_text(plan.min_seconds());
-  if (plan.min_samples() == plan.max_samples()) return least + text(" (%.1f s)", plan.min_seconds());
+  if (plan.min_samples() == plan.max_samples())
+    return least + text(" (%.1f s)", plan.min_seconds());
   return least + " to " + duration_text(plan.max_seconds()) +
          text(" (%.1f to %.1f s)", plan.min_seconds(), plan.max_seconds());
 }
@@ -73,19 +74,19 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
   stream << text("amplitude in %s, velocity in %s/s, acceleration in %s/s²\n", unit.c_str(),
                  unit.c_str(), unit.c_str());
   stream << text("%5s %12s %14s %11s %11s %12s %9s %7s %9s %10s %10s\n", "point", "asked Hz",
-                 "exact Hz", "amplitude", "velocity", "acceleration", "settle s", "blocks", "block s",
-                 "at least s", "at most s");
+                 "exact Hz", "amplitude", "velocity", "acceleration", "settle s", "blocks",
+                 "block s", "at least s", "at most s");
   for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
     const Dwell& dwell = plan.dwells[i];
     const double frequency_hz = dwell.frequency_hz(plan.rate_hz);
     const double omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
     const double amplitude = dwell.tones.front().amplitude;
     stream << text(
-        "%5zu %12.6g %14.9g %11.4g %11.4g %12.4g %9.3f %7u %9.4f %10.3f %10.3f\n", i + 1, dwell.asked_hz,
-        frequency_hz, amplitude, amplitude * omega_rad_s, amplitude * omega_rad_s * omega_rad_s,
-        seconds_of(dwell.settle_samples, plan.rate_hz), dwell.blocks,
-        seconds_of(dwell.block_samples, plan.rate_hz), seconds_of(dwell.min_samples(), plan.rate_hz),
-        seconds_of(dwell.max_samples, plan.rate_hz));
+        "%5zu %12.6g %14.9g %11.4g %11.4g %12.4g %9.3f %7u %9.4f %10.3f %10.3f\n", i + 1,
+        dwell.asked_hz, frequency_hz, amplitude, amplitude * omega_rad_s,
+        amplitude * omega_rad_s * omega_rad_s, seconds_of(dwell.settle_samples, plan.rate_hz),
+        dwell.blocks, seconds_of(dwell.block_samples, plan.rate_hz),
+        seconds_of(dwell.min_samples(), plan.rate_hz), seconds_of(dwell.max_samples, plan.rate_hz));
   }
   stream << break_points(sweep);
   const std::size_t asked = asked_frequencies(sweep).size();
@@ -140,10 +141,7 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
 }
 
 Progress::Progress(std::ostream& stream, bool terminal, const SweepPlan& plan)
-    : stream_{stream},
-      terminal_{terminal},
-      plan_{plan},
-      start_{std::chrono::steady_clock::now()} {}
+    : stream_{stream}, terminal_{terminal}, plan_{plan}, start_{std::chrono::steady_clock::now()} {}
 
 void Progress::point(const Point& point) {
   if (point.tone != 0 || point.output != first_sensor_channel) return;
@@ -154,8 +152,8 @@ void Progress::point(const Point& point) {
   }
 }
 
-// How much is done is counted in the least that each dwell takes; what the finished ones took on top
-// tells the rest.
+// How much is done is counted in the least that each dwell takes; what the finished ones took on
+// top tells the rest.
 void Progress::update(std::uint32_t dwell) {
   if (!terminal_) return;
   constexpr int width = 30;
@@ -163,8 +161,7 @@ void Progress::update(std::uint32_t dwell) {
   for (std::size_t i = 0; i < std::min<std::size_t>(dwell, plan_.dwells.size()); ++i) {
     done_samples += plan_.dwells[i].min_samples();
   }
-  const double done =
-      static_cast<double>(done_samples) / static_cast<double>(plan_.min_samples());
+  const double done = static_cast<double>(done_samples) / static_cast<double>(plan_.min_samples());
   const double elapsed_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   const double remaining_s = done > 0.0 ? elapsed_s * (1.0 - done) / done : plan_.min_seconds();

@@ -64,8 +64,8 @@ bool WindowEstimator::estimate(const Regression& regression, const Window& windo
   const std::size_t order = regression.order();
   if (!solve(regression, window, pair.input, input_)) return false;
   if (!solve(regression, window, pair.output, output_)) return false;
-  const auto length = static_cast<double>(regression.samples_at(window.last) -
-                                          regression.samples_at(window.first));
+  const auto length =
+      static_cast<double>(regression.samples_at(window.last) - regression.samples_at(window.first));
   for (std::size_t tone = 0; tone < estimates.size(); ++tone) {
     input_.turn[tone] = turn(omega_rad_s[tone], regression.common_offset_ns(pair.input));
     output_.turn[tone] = turn(omega_rad_s[tone], regression.common_offset_ns(pair.output));

@@ -41,25 +41,25 @@ struct Window {
 
 struct Estimate {
   std::complex<double> response;
-  std::complex<double> input;   // U and Y at their true times, b + j a
+  std::complex<double> input;  // U and Y at their true times, b + j a
   std::complex<double> output;
-  Covariance2 white;            // of H, were the residual white
-  double scatter = 0.0;         // variance of one component of H from the clusters
-  double scatter_dof = 0.0;     // 0: too few clusters
-  double residual_rms = 0.0;    // of the output
-  double distortion = 0.0;      // of the output: harmonics beyond the noise, relative to the tone
+  Covariance2 white;          // of H, were the residual white
+  double scatter = 0.0;       // variance of one component of H from the clusters
+  double scatter_dof = 0.0;   // 0: too few clusters
+  double residual_rms = 0.0;  // of the output
+  double distortion = 0.0;    // of the output: harmonics beyond the noise, relative to the tone
   double drift_per_sample = 0.0;
-  double burst = 0.0;           // residual power of the worst cluster over that of the others
-  double lost = 0.0;            // samples of the output that are missing
-  double samples = 0.0;         // of the output that were used
+  double burst = 0.0;    // residual power of the worst cluster over that of the others
+  double lost = 0.0;     // samples of the output that are missing
+  double samples = 0.0;  // of the output that were used
 };
 
 class WindowEstimator {
  public:
   explicit WindowEstimator(std::size_t max_bins);
 
-  // One estimate per tone; bins beyond are harmonics of the first. `omega_rad_s` per bin. False where
-  // the window does not determine the coefficients.
+  // One estimate per tone; bins beyond are harmonics of the first. `omega_rad_s` per bin. False
+  // where the window does not determine the coefficients.
   bool estimate(const Regression& regression, const Window& window, const Pair& pair,
                 std::span<const double> omega_rad_s,
                 std::span<Estimate> estimates) noexcept SINERIG_NONBLOCKING;

@@ -1,13 +1,24 @@
 #include "sweep/excitation.h"
 
 #include <cmath>
+#include <numbers>
 
 namespace sinerig {
 
 Excitation::Excitation(std::size_t max_tones, std::size_t max_bins)
     : voices_(max_tones), phasors_(max_bins) {}
 
+// Of the running single tone, one tick on.
+double Excitation::carried_phase_rad() const noexcept {
+  PhaseCounter next = voices_[0].phase;
+  next.advance(1);
+  if (next.index() == 0) return voices_[0].start_rad;
+  const Phasor at = next.phasor();
+  return std::atan2(at.sine, at.cosine) + voices_[0].start_rad;
+}
+
 void Excitation::start(const Dwell& dwell, double from_scale) noexcept {
+  const double carried = tones_ == 1 && dwell.tones.size() == 1 ? carried_phase_rad() : 0.0;
   tones_ = dwell.tones.size();
   bins_ = dwell.bins();
   elapsed_ = 0;
@@ -15,9 +26,11 @@ void Excitation::start(const Dwell& dwell, double from_scale) noexcept {
   from_scale_ = from_scale;
   for (std::size_t i = 0; i < tones_; ++i) {
     const Tone& tone = dwell.tones[i];
+    const double start_rad = std::remainder(tone.phase_rad + carried, 2.0 * std::numbers::pi);
     voices_[i] = {.phase = PhaseCounter{tone.cycles, dwell.block_samples},
-                  .in_phase = tone.amplitude * std::cos(tone.phase_rad),
-                  .quadrature = tone.amplitude * std::sin(tone.phase_rad)};
+                  .in_phase = tone.amplitude * std::cos(start_rad),
+                  .quadrature = tone.amplitude * std::sin(start_rad),
+                  .start_rad = start_rad};
   }
   refresh();
 }

@@ -16,8 +16,10 @@ class Excitation {
  public:
   Excitation(std::size_t max_tones, std::size_t max_bins);
 
-  // Begins a dwell at phase zero; over its ramp the envelope moves from `from_scale` to 1 (a scale
-  // of the dwell's own amplitude, so that the amplitude itself has no step).
+  // Begins a dwell. A single tone goes on from the phase that the single tone before has reached,
+  // so that the command has no step; after whole cycles that is zero. Over the ramp the envelope
+  // moves from `from_scale` to 1 (a scale of the dwell's own amplitude: the amplitude has no step
+  // either).
   void start(const Dwell& dwell, double from_scale) noexcept SINERIG_NONBLOCKING;
 
   // Moves on by `ticks`.
@@ -33,8 +35,10 @@ class Excitation {
     PhaseCounter phase;
     double in_phase = 0.0;    // amplitude · cos(start phase)
     double quadrature = 0.0;  // amplitude · sin(start phase)
+    double start_rad = 0.0;
   };
 
+  double carried_phase_rad() const noexcept;
   void refresh() noexcept;
 
   std::vector<Voice> voices_;

@@ -49,11 +49,12 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
 
 void Measurement::start(const Dwell& dwell) noexcept {
   dwell_ = &dwell;
-  const double per_cycle = 2.0 * std::numbers::pi * rate_hz_ / static_cast<double>(dwell.block_samples);
+  const double per_cycle =
+      2.0 * std::numbers::pi * rate_hz_ / static_cast<double>(dwell.block_samples);
   const std::size_t tones = dwell.tones.size();
   for (std::size_t bin = 0; bin < dwell.bins(); ++bin) {
-    const std::uint64_t cycles = bin < tones ? dwell.tones[bin].cycles
-                                             : dwell.tones[0].cycles * (bin - tones + 2);
+    const std::uint64_t cycles =
+        bin < tones ? dwell.tones[bin].cycles : dwell.tones[0].cycles * (bin - tones + 2);
     omega_[bin] = per_cycle * static_cast<double>(cycles);
   }
   regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
@@ -128,8 +129,9 @@ Window Measurement::current_window() noexcept {
 
 bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {
   const std::size_t tones = dwell_->tones.size();
-  const bool solved = estimator_.estimate(regression_, window, pairs_[pair],
-                                          {omega_.data(), dwell_->bins()}, {estimates_.data(), tones});
+  const bool solved =
+      estimator_.estimate(regression_, window, pairs_[pair], {omega_.data(), dwell_->bins()},
+                          {estimates_.data(), tones});
   for (std::size_t tone = 0; tone < tones; ++tone) {
     Result& each = result(pair, tone);
     each.known = solved;
@@ -169,7 +171,8 @@ bool Measurement::late_half_agrees(const Window& window) noexcept {
     const double excess = std::max(0.0, late_variance - variance);
     whole.late_shift = std::abs(estimates_[tone].response - whole.estimate.response) / gain;
     whole.late_noise = std::sqrt(2.0 * excess) / gain;
-    const double allowed = std::max(settling_tolerance(), settling_sigmas * std::sqrt(excess) / gain);
+    const double allowed =
+        std::max(settling_tolerance(), settling_sigmas * std::sqrt(excess) / gain);
     agrees = agrees && whole.late_shift <= allowed;
   }
   return agrees;
@@ -182,12 +185,14 @@ Interval Measurement::interval(const Result& result) const noexcept {
   const double re = response.real();
   const double im = response.imag();
   // Variances along and across H, relative to it.
-  const double along = (re * re * c.re_re + 2.0 * re * im * c.re_im + im * im * c.im_im) / square / square;
-  const double across = (im * im * c.re_re - 2.0 * re * im * c.re_im + re * re * c.im_im) / square / square;
+  const double along =
+      (re * re * c.re_re + 2.0 * re * im * c.re_im + im * im * c.im_im) / square / square;
+  const double across =
+      (im * im * c.re_re - 2.0 * re * im * c.re_im + re * re * c.im_im) / square / square;
   const double t = student_t_975(result.variance.dof);
   // What the transient may have left: the shift of the late half beyond its noise.
-  const double left = std::max(0.0, result.late_shift * result.late_shift -
-                                        result.late_noise * result.late_noise);
+  const double left =
+      std::max(0.0, result.late_shift * result.late_shift - result.late_noise * result.late_noise);
   return {.gain_db = db_per_relative * std::sqrt(t * t * along + left),
           .phase_deg = degrees_per_radian * std::sqrt(t * t * across + left)};
 }
@@ -205,7 +210,8 @@ bool Measurement::target_met() const noexcept {
 
 void Measurement::judge() noexcept {
   const Window window = current_window();
-  const std::uint64_t length = regression_.samples_at(window.last) - regression_.samples_at(window.first);
+  const std::uint64_t length =
+      regression_.samples_at(window.last) - regression_.samples_at(window.first);
   if (length < dwell_->blocks * dwell_->block_samples) return;
   if (!evaluate(0, window)) return;
   if (judgement_.settling == Settling::detect) {
@@ -261,16 +267,19 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   point.phase_interval_deg = half.phase_deg;
   point.input_amplitude = std::abs(estimate.input);
   point.output_amplitude = std::abs(estimate.output);
-  point.snr_db = 20.0 * std::log10(point.output_amplitude / std::numbers::sqrt2 / estimate.residual_rms);
+  point.snr_db =
+      20.0 * std::log10(point.output_amplitude / std::numbers::sqrt2 / estimate.residual_rms);
   point.distortion = estimate.distortion;
-  point.drift_per_s = estimate.drift_per_sample / static_cast<double>(dwell_->block_samples) * rate_hz_;
+  point.drift_per_s =
+      estimate.drift_per_sample / static_cast<double>(dwell_->block_samples) * rate_hz_;
   point.samples = estimate.samples;
   point.lost = estimate.lost;
   const double loud = estimate.burst - 1.0;
   const double samples_per_cluster = estimate.samples / (0.5 * estimate.scatter_dof + 1.0);
   // Above this the residual is the rounding of the arithmetic, which has no statistics.
   const bool real_noise = point.snr_db < 140.0;
-  const bool burst = real_noise && estimate.burst > burst_ratio && loud > 8.0 * std::sqrt(2.0 / samples_per_cluster);
+  const bool burst = real_noise && estimate.burst > burst_ratio &&
+                     loud > 8.0 * std::sqrt(2.0 / samples_per_cluster);
   const auto mark = [&](PointStatus status, PointReason reason, double value) {
     point.status = status;
     point.reason = reason;

@@ -47,7 +47,8 @@ class Measurement {
   // A complete block of whole cycles has ended with the last add(); its plain sums.
   bool block_ended() const noexcept { return block_ended_; }
   Coefficients block_coefficients(std::size_t channel, std::size_t tone) const noexcept {
-    return regression_.block_coefficients(channel, tone, static_cast<double>(dwell_->block_samples));
+    return regression_.block_coefficients(channel, tone,
+                                          static_cast<double>(dwell_->block_samples));
   }
 
   // Takes the judgement as it stands, for the end of the dwell or a stop in the midst of it.
@@ -73,7 +74,9 @@ class Measurement {
   bool late_half_agrees(const Window& window) noexcept;
   bool target_met() const noexcept;
   double settling_tolerance() const noexcept;
-  Result& result(std::size_t pair, std::size_t tone) noexcept { return results_[pair * max_tones_ + tone]; }
+  Result& result(std::size_t pair, std::size_t tone) noexcept {
+    return results_[pair * max_tones_ + tone];
+  }
   const Result& result(std::size_t pair, std::size_t tone) const noexcept {
     return results_[pair * max_tones_ + tone];
   }
@@ -93,8 +96,8 @@ class Measurement {
   std::uint64_t samples_ = 0;  // since the start or the last disturbance
   std::uint32_t part_ = 0;     // within the block
   std::uint64_t in_block_ = 0;
-  std::size_t first_ = 0;      // checkpoint at which the window under judgement begins
-  std::size_t stride_ = 1;     // of the regression when first_ was set
+  std::size_t first_ = 0;   // checkpoint at which the window under judgement begins
+  std::size_t stride_ = 1;  // of the regression when first_ was set
   bool block_complete_ = true;
   bool block_ended_ = false;
   bool settled_ = false;

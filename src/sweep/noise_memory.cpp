@@ -25,7 +25,8 @@ PooledVariance NoiseMemory::pooled(const Estimate& estimate, double frequency_hz
   double weight = 0.0;
   double weighted_colour = 0.0;
   for (const Lesson& lesson : lessons_) {
-    const double each = lesson.dof * std::exp(-std::abs(lesson.log_frequency - log_frequency) / reach);
+    const double each =
+        lesson.dof * std::exp(-std::abs(lesson.log_frequency - log_frequency) / reach);
     weight += each;
     weighted_colour += each * lesson.colour;
   }

@@ -20,8 +20,8 @@ struct PooledVariance {
 class NoiseMemory {
  public:
   // The variance of H at this frequency, from the clusters of the window and the memory together.
-  PooledVariance pooled(const Estimate& estimate, double frequency_hz) const noexcept
-      SINERIG_NONBLOCKING;
+  PooledVariance pooled(const Estimate& estimate,
+                        double frequency_hz) const noexcept SINERIG_NONBLOCKING;
 
   // Takes in a finished dwell.
   void learn(const Estimate& estimate, double frequency_hz) noexcept SINERIG_NONBLOCKING;

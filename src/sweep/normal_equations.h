@@ -1,5 +1,5 @@
-// Least squares by running normal equations: what a dwell accumulates each tick, and what any window
-// of it is solved from. Fixed sizes after construction, no allocation in use.
+// Least squares by running normal equations: what a dwell accumulates each tick, and what any
+// window of it is solved from. Fixed sizes after construction, no allocation in use.
 #pragma once
 
 #include <cstddef>
@@ -11,7 +11,9 @@
 namespace sinerig {
 
 // Elements of a symmetric matrix of order n, by rows of its lower triangle.
-constexpr std::size_t triangle(std::size_t n) { return n * (n + 1) / 2; }
+constexpr std::size_t triangle(std::size_t n) {
+  return n * (n + 1) / 2;
+}
 
 // Σ x xᵀ, Σ x y, Σ y², count of one signal over a window. x has `order` regressors.
 struct NormalSums {

@@ -114,12 +114,13 @@ Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz) {
   const double ramp_samples = std::ceil(sweep.ramp_s * rate_hz - 1e-9);
   // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
   const double settle_unit = sweep.settling == Settling::fixed ? base_samples : 1.0;
-  const double settle_samples =
-      settle_unit * std::max(std::ceil(ramp_samples / settle_unit), length(sweep.settle, settle_unit));
+  const double settle_samples = settle_unit * std::max(std::ceil(ramp_samples / settle_unit),
+                                                       length(sweep.settle, settle_unit));
   const double blocks = std::max(1.0, length(sweep.integrate, block_samples));
   const bool open_ended = sweep.has_target() || sweep.settling == Settling::detect;
   double max_samples = settle_samples + blocks * block_samples;
-  if (sweep.settling == Settling::detect) max_samples += length(sweep.settle_max, block_samples) * block_samples;
+  if (sweep.settling == Settling::detect)
+    max_samples += length(sweep.settle_max, block_samples) * block_samples;
   if (sweep.has_target()) max_samples += length(sweep.integrate_max, block_samples) * block_samples;
   if (max_samples > max_dwell_samples) {
     throw PlanRefused("sweep", open_ended ? "integrate_max_s" : "integrate_s",

@@ -47,13 +47,13 @@ struct SweepSettings {
   double ramp_s = 0.0;  // the amplitude moves from that of the last dwell to its own
 
   Settling settling = Settling::detect;
-  Span settle{.cycles = 0.0, .seconds = 0.0};     // waited for before anything is measured
-  Span settle_max{.cycles = 20.0, .seconds = 20.0};  // detect: how long settling may take
-  Span integrate{.cycles = 1.0, .seconds = 0.1};  // at least
+  Span settle{.cycles = 0.0, .seconds = 0.0};           // waited for before anything is measured
+  Span settle_max{.cycles = 20.0, .seconds = 20.0};     // detect: how long settling may take
+  Span integrate{.cycles = 1.0, .seconds = 0.1};        // at least
   Span integrate_max{.cycles = 20.0, .seconds = 20.0};  // at most, when the target is not reached
   Span block{.cycles = 1.0, .seconds = 0.02};
-  double target_db = 0.05;   // half width of the 95 % interval of the gain; 0 = no target …
-  double target_deg = 0.3;   // … and of the phase; without targets exactly `integrate` is measured
+  double target_db = 0.05;  // half width of the 95 % interval of the gain; 0 = no target …
+  double target_deg = 0.3;  // … and of the phase; without targets exactly `integrate` is measured
   std::uint32_t harmonics = 3;  // highest harmonic of the tone that is watched
   double max_distortion = 0.1;
 
@@ -98,7 +98,7 @@ struct Dwell {
 // When a dwell has been measured well enough; the same for all dwells of a sweep.
 struct Judgement {
   Settling settling = Settling::detect;
-  double target_db = 0.0;   // 0 = none
+  double target_db = 0.0;  // 0 = none
   double target_deg = 0.0;
   double max_distortion = 0.1;  // more than this part of the tone in harmonics is a distorted point
 

@@ -132,7 +132,9 @@ Coefficients Regression::block_coefficients(std::size_t channel, std::size_t bin
                                             double samples) const noexcept {
   const double* from = &block_start_[channel * order()];
   const double* to = &totals_[moments_at(channel)];
-  const auto sum = [&](std::size_t row) { return to[row] - from[row]; };
+  const auto sum = [&](std::size_t row) {
+    return to[row] - from[row];
+  };
   return {.a = 2.0 / samples * sum(cosine_row(bin)),
           .b = 2.0 / samples * sum(sine_row(bin)),
           .mean = references_[channel] + sum(constant_row) / samples};

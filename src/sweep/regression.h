@@ -55,9 +55,9 @@ class Regression {
   void add(std::span<const Phasor> phasors,
            std::span<const Observation> observations) noexcept SINERIG_NONBLOCKING;
 
-  // Begins a block of whole cycles; its plain sums once `samples` have been added to it, all of them
-  // there and on the grid. A mean is subtracted from each channel before it is summed, so that a
-  // large offset costs no digits.
+  // Begins a block of whole cycles; its plain sums once `samples` have been added to it, all of
+  // them there and on the grid. A mean is subtracted from each channel before it is summed, so that
+  // a large offset costs no digits.
   void begin_block() noexcept SINERIG_NONBLOCKING;
   Coefficients block_coefficients(std::size_t channel, std::size_t bin,
                                   double samples) const noexcept SINERIG_NONBLOCKING;

@@ -144,9 +144,10 @@ void SweepRunner::exchange(double command, const Tick& tick) noexcept {
     observe(1 + i, sample);
   }
   if (settings_.record_samples) {
-    TickSamples samples{.tick = tick.index,
-                        .dwell = dwell_,
-                        .channels = static_cast<std::uint32_t>(first_sensor_channel + sensors_.size())};
+    TickSamples samples{
+        .tick = tick.index,
+        .dwell = dwell_,
+        .channels = static_cast<std::uint32_t>(first_sensor_channel + sensors_.size())};
     samples.values[command_channel] = command;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
       samples.values[applied_channel + i] = observations_[i].value;
