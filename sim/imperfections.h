@@ -48,6 +48,7 @@ inline double quantise(double value, double quantum) noexcept {
 }
 
 struct ActuatorImperfections {
+  double gain = 1.0;    // of the command; -1 is a swapped wire, 0 a drive that is not enabled
   double min = -never;  // clamp; a saturating power stage that reports what it applies
   double max = never;
   double quantum = 0.0;

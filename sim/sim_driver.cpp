@@ -99,11 +99,34 @@ Friction read_friction(const Section& plant, const LinearSystem& system) {
   return friction;
 }
 
+void read_controller(const Section& plant, SimulatedRigSettings& rig) {
+  const auto section = plant.table("controller");
+  if (!section) return;
+  ControllerSettings controller;
+  controller.proportional = section->number("proportional", any_number, controller.proportional);
+  controller.integral = section->number("integral", any_number, controller.integral);
+  controller.derivative = section->number("derivative", any_number, controller.derivative);
+  controller.derivative_hz =
+      section->number("derivative_hz", zero_or_more, controller.derivative_hz);
+  const std::string injection = section->choice("inject", {"reference", "plant_input"});
+  controller.injection = injection == "reference" ? Injection::reference : Injection::plant_input;
+  const std::vector<std::string>& outputs = rig.system.outputs;
+  const std::string feedback = section->text("feedback", outputs.front());
+  const auto found = std::find(outputs.begin(), outputs.end(), feedback);
+  if (found == outputs.end()) section->refuse("feedback", "the plant has no such output");
+  rig.feedback = static_cast<std::size_t>(found - outputs.begin());
+  if (rig.system.d(static_cast<Eigen::Index>(rig.feedback)) != 0.0) {
+    section->refuse("feedback", "must be an output without direct feedthrough from the input");
+  }
+  rig.controller = controller;
+}
+
 ActuatorImperfections read_actuator(const Section& section) {
   ActuatorImperfections actuator;
   actuator.min = section.number("clamp_min", any_number, actuator.min);
   actuator.max = section.number("clamp_max", any_number, actuator.max);
   if (!(actuator.min < actuator.max)) section.refuse("clamp_min", "must be below clamp_max");
+  actuator.gain = section.number("gain", any_number, actuator.gain);
   actuator.quantum = section.number("quantum", zero_or_more, actuator.quantum);
   actuator.slew_per_s = section.number("slew_limit_per_s", above_zero, actuator.slew_per_s);
   actuator.dropout_fraction =
@@ -111,17 +134,31 @@ ActuatorImperfections read_actuator(const Section& section) {
   return actuator;
 }
 
-SimulatedSensor read_sensor(const Section& section, const LinearSystem& system, double period_s) {
-  SimulatedSensor sensor;
-  const std::string output = section.text("output", system.outputs.front());
-  const auto found = std::find(system.outputs.begin(), system.outputs.end(), output);
-  if (found == system.outputs.end()) {
+// "output" of a sensor: a row of the plant, or a signal of the loop around it.
+void read_signal(const Section& section, const SimulatedRigSettings& rig, SimulatedSensor& sensor) {
+  constexpr std::pair<std::string_view, Signal> loop_signals[] = {
+      {"error", Signal::error}, {"control", Signal::control}, {"plant_input", Signal::plant_input}};
+  const std::vector<std::string>& outputs = rig.system.outputs;
+  const std::string name = section.text("output", outputs.front());
+  for (const auto& [signal_name, signal] : loop_signals) {
+    if (!rig.controller || name != signal_name) continue;
+    sensor.signal = signal;
+    return;
+  }
+  const auto found = std::find(outputs.begin(), outputs.end(), name);
+  if (found == outputs.end()) {
     std::string names;
-    for (const std::string& name : system.outputs) names += " \"" + name + "\"";
+    for (const std::string& each : outputs) names += " \"" + each + "\"";
+    if (rig.controller) names += " \"error\" \"control\" \"plant_input\"";
     section.refuse("output", "the plant has no such output; it has" + names);
   }
-  sensor.output = static_cast<std::size_t>(found - system.outputs.begin());
+  sensor.output = static_cast<std::size_t>(found - outputs.begin());
+}
 
+SimulatedSensor read_sensor(const Section& section, const SimulatedRigSettings& rig,
+                            double period_s) {
+  SimulatedSensor sensor;
+  read_signal(section, rig, sensor);
   SensorImperfections& wrong = sensor.imperfections;
   wrong.delay_s = section.number("delay_s", {.min = 0.0, .max = 10.0}, wrong.delay_s);
   wrong.jitter_s =
@@ -165,11 +202,11 @@ std::unique_ptr<Device> configure(const DeviceRequest& request) {
   settings.friction = read_friction(plant, settings.system);
   settings.seed = static_cast<std::uint64_t>(
       plant.integer("seed", {.min = 0.0, .max = 9e15}, static_cast<std::int64_t>(settings.seed)));
+  read_controller(plant, settings);
   settings.actuator = read_actuator(request.actuator->section);
   settings.neutral = request.rig.guard.neutral;
   for (const config::Channel* sensor : request.sensors) {
-    settings.sensors.push_back(
-        read_sensor(sensor->section, settings.system, 1.0 / request.rig.rate_hz));
+    settings.sensors.push_back(read_sensor(sensor->section, settings, 1.0 / request.rig.rate_hz));
   }
   return std::make_unique<SimDevice>(std::move(settings));
 }

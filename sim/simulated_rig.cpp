@@ -20,9 +20,23 @@ class SimulatedRig::Core {
  public:
   Core(const SimulatedRigSettings& settings, const Clock& clock);
 
-  void apply(double value) noexcept {
-    plant_.apply(value, plant_time(clock_.now(), period_ns_));
+  // The command becomes the input of the plant, or of the loop around it. A controller reads before
+  // it writes: its plant has no direct feedthrough, so sampling first changes nothing.
+  void apply(double command) noexcept {
+    const PlantTime now = plant_time(clock_.now(), period_ns_);
+    if (!controller_) {
+      plant_.apply(command, now);
+      refresh();
+      return;
+    }
     refresh();
+    plant_.sample(now, outputs_);
+    plant_.apply(controller_->step(command, outputs_[feedback_]).plant_input, now);
+    for (Channel& channel : channels_) {
+      if (channel.signal != Signal::plant_output) {
+        channel.history[channel.newest].value = loop_signal(channel.signal);
+      }
+    }
   }
 
   // The sample of a sensor's output; a second read without a command in between samples again.
@@ -33,6 +47,7 @@ class SimulatedRig::Core {
 
  private:
   struct Channel {
+    Signal signal;
     std::size_t output;
     double delay_ticks;
     double jitter_ticks;
@@ -46,11 +61,14 @@ class SimulatedRig::Core {
   };
 
   void refresh() noexcept;
+  double loop_signal(Signal signal) const noexcept;
   void sample(Channel& channel, std::int64_t now_ns, PlantTime now) noexcept;
 
   const Clock& clock_;
   double period_ns_;
   Plant plant_;
+  std::optional<Controller> controller_;
+  std::size_t feedback_;
   std::vector<double> outputs_;
   std::vector<Channel> channels_;
   std::vector<std::size_t> order_;  // channels by sampling instant
@@ -60,7 +78,15 @@ SimulatedRig::Core::Core(const SimulatedRigSettings& settings, const Clock& cloc
     : clock_{clock},
       period_ns_{clock.grid().period_s() * 1e9},
       plant_{settings.system, clock.grid().period_s(), settings.friction},
+      feedback_{settings.feedback},
       outputs_(plant_.outputs()) {
+  if (settings.controller) {
+    if (settings.system.d(static_cast<Eigen::Index>(settings.feedback)) != 0.0) {
+      throw std::invalid_argument(
+          "a controller needs a plant without direct feedthrough to the output that it controls");
+    }
+    controller_.emplace(*settings.controller, clock.grid().period_s());
+  }
   for (std::size_t i = 0; i < settings.sensors.size(); ++i) {
     const SimulatedSensor& sensor = settings.sensors[i];
     const double delay_ticks = sensor.imperfections.delay_s / period_s();
@@ -70,7 +96,8 @@ SimulatedRig::Core::Core(const SimulatedRigSettings& settings, const Clock& cloc
     if (jitter_ticks >= 1.0) {
       throw std::invalid_argument("the jitter of a simulated sensor must be below one period");
     }
-    channels_.push_back({.output = sensor.output,
+    channels_.push_back({.signal = sensor.signal,
+                         .output = sensor.output,
                          .delay_ticks = std::max(0.0, delay_ticks - whole),
                          .jitter_ticks = jitter_ticks,
                          .history = std::vector<Sample>(static_cast<std::size_t>(whole) + 1),
@@ -113,6 +140,12 @@ void SimulatedRig::Core::sample(Channel& channel, std::int64_t now_ns, PlantTime
   channel.taken = false;
 }
 
+double SimulatedRig::Core::loop_signal(Signal signal) const noexcept {
+  const Controller::Signals& signals = controller_->signals();
+  if (signal == Signal::error) return signals.error;
+  return signal == Signal::control ? signals.control : signals.plant_input;
+}
+
 Sample SimulatedRig::Core::take(std::size_t sensor) noexcept {
   Channel& channel = channels_[sensor];
   if (channel.taken) refresh();
@@ -136,7 +169,8 @@ class SimulatedRig::Drive final : public Actuator {
         settings_.dropout_fraction > 0.0 &&
         std::uniform_real_distribution<double>{}(dropout_) < settings_.dropout_fraction;
     if (!lost) {
-      const double slewed = std::clamp(command, held_ - max_step_, held_ + max_step_);
+      const double slewed =
+          std::clamp(settings_.gain * command, held_ - max_step_, held_ + max_step_);
       held_ =
           std::clamp(quantise(std::clamp(slewed, settings_.min, settings_.max), settings_.quantum),
                      settings_.min, settings_.max);

@@ -9,17 +9,24 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "drivers/driver.h"
+#include "sim/controller.h"
 #include "sim/imperfections.h"
 #include "sim/plant.h"
 #include "sweep/clock.h"
 
 namespace sinerig::sim {
 
+// What a sensor can read: an output of the plant or, with a controller around it, a signal of the
+// loop.
+enum class Signal : std::uint8_t { plant_output, error, control, plant_input };
+
 struct SimulatedSensor {
+  Signal signal = Signal::plant_output;
   std::size_t output = 0;  // row of the plant
   SensorImperfections imperfections;
 };
@@ -31,6 +38,8 @@ struct SimulatedRigSettings {
   std::vector<SimulatedSensor> sensors;
   double neutral = 0.0;
   std::uint64_t seed = 1;
+  std::optional<ControllerSettings> controller;  // closes the loop around the plant
+  std::size_t feedback = 0;                      // row of the plant that it controls
 };
 
 class SimulatedRig {

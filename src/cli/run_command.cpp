@@ -165,8 +165,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
     writer.discard();
     throw;
   }
-  const RunnerSettings settings{.record_samples = rig.record_samples};
-  SweepRunner runner{plan,  settings, clock, configured.actuator(), configured.sensors(),
+  SweepRunner runner{plan,  rig.runner, clock, configured.actuator(), configured.sensors(),
                      guard, outbox};
   report::Progress progress{std::cout, isatty(STDOUT_FILENO) != 0, plan};
   const RunOutcome outcome = play(runner, control, outbox, writer, progress);

@@ -140,6 +140,34 @@ Channel read_channel(Section section, const std::string& name) {
           .section = section};
 }
 
+// "output/input" by the names of the sensors, and "applied".
+Pairs read_responses(const Section& sweep, const std::vector<Channel>& sensors) {
+  Pairs pairs;
+  if (!sweep.has("responses")) return pairs;
+  const auto channel = [&](const std::string& name) -> std::size_t {
+    if (name == "applied") return 0;
+    for (std::size_t i = 0; i < sensors.size(); ++i) {
+      if (sensors[i].name == name) return 1 + i;
+    }
+    sweep.refuse("responses",
+                 "there is no channel \"" + name + "\"; use \"applied\" or a sensor's name");
+  };
+  for (const std::string& text : sweep.texts("responses")) {
+    const std::size_t slash = text.find('/');
+    if (slash == std::string::npos) {
+      sweep.refuse("responses", "\"" + text + "\" must be \"output/input\"");
+    }
+    const std::size_t output = channel(text.substr(0, slash));
+    const std::size_t input = channel(text.substr(slash + 1));
+    if (output == 0 || input == output) {
+      sweep.refuse("responses", "\"" + text + "\" must be a sensor over another channel");
+    }
+    pairs.push_back({.input = input, .output = output, .exact_input = input == 0});
+  }
+  if (pairs.empty()) sweep.refuse("responses", "must hold at least one");
+  return pairs;
+}
+
 GuardSettings read_guard(const Section& limits, const MotionLimits& motion, double rate_hz) {
   GuardSettings guard;
   guard.command_min = motion.command_min;
@@ -202,8 +230,12 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
     rig.guard.channels.push_back(read_channel_limits(sensor.section));
   }
   if (const auto output = file->find("output")) {
-    rig.record_samples = output->flag("samples", false);
+    rig.runner.record_samples = output->flag("samples", false);
   }
+  for (std::size_t i = 0; i < rig.sensors.size(); ++i) {
+    if (rig.sensors[i].section.flag("readback", false)) rig.runner.readbacks.push_back(i);
+  }
+  rig.runner.responses = read_responses(sweep, rig.sensors);
   rig.file = std::move(file);
   return rig;
 }

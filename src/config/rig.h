@@ -9,6 +9,7 @@
 #include "config/section.h"
 #include "sweep/guard.h"
 #include "sweep/plan.h"
+#include "sweep/runner.h"
 
 namespace sinerig::config {
 
@@ -31,7 +32,7 @@ struct Rig {
   GuardSettings guard{};
   Channel actuator;
   std::vector<Channel> sensors{};
-  bool record_samples = false;
+  RunnerSettings runner{};
 
   // The plan of this rig; PlanRefused becomes a ConfigError with file and line.
   SweepPlan plan() const;

@@ -203,6 +203,14 @@ std::vector<std::complex<double>> Section::roots(std::string_view key) const {
   return roots;
 }
 
+std::optional<Section> Section::table(std::string_view key) const {
+  if (!has(key)) return std::nullopt;
+  const toml::node& node = Access::require(*this, key, "");
+  if (!node.is_table()) refuse(key, std::string{"must be a section, is "} + kind_of(node));
+  return Section{name_ + "." + std::string{key}, pattern_ + "." + std::string{key},
+                 std::make_shared<Node>(Node{node.as_table()}), *file_};
+}
+
 std::vector<Section> Section::tables(std::string_view key) const {
   if (!has(key)) return {};
   const toml::array& array = Access::require_array(*this, key, "must be an array of tables");

@@ -65,6 +65,9 @@ class Section {
   // Real numbers and [re, im] pairs.
   std::vector<std::complex<double>> roots(std::string_view key) const;
 
+  // [section.key]; empty where the key is missing.
+  std::optional<Section> table(std::string_view key) const;
+
   // [[section.key]]; empty where the key is missing.
   std::vector<Section> tables(std::string_view key) const;
 

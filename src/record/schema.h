@@ -43,6 +43,7 @@ CREATE TABLE tone (
 CREATE TABLE point (            -- H = Y/U at one frequency, written when its dwell has finished
   dwell            INTEGER NOT NULL REFERENCES dwell,
   tone             INTEGER NOT NULL,
+  response         INTEGER NOT NULL, -- 0 is the one that the dwells are judged by
   input            INTEGER NOT NULL REFERENCES channel,
   output           INTEGER NOT NULL REFERENCES channel,
   freq_hz          REAL NOT NULL,
@@ -65,7 +66,7 @@ CREATE TABLE point (            -- H = Y/U at one frequency, written when its dw
   status           TEXT NOT NULL, -- good unsettled low_signal clipped distorted rt_fault stopped
   reason           TEXT NOT NULL,
   reason_value     REAL,
-  PRIMARY KEY (dwell, tone, input, output)
+  PRIMARY KEY (dwell, tone, response)
 ) WITHOUT ROWID;
 
 CREATE TABLE block (            -- plain sums of a complete block: y ~ mean + a cos(ωt) + b sin(ωt),

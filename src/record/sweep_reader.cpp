@@ -61,7 +61,7 @@ std::vector<StoredResponse> read_responses(Database& database) {
       "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, dof, "
       "gain_interval_db, phase_interval_deg, input_amplitude, output_amplitude, snr_db, "
       "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value "
-      "FROM point ORDER BY input, output, freq_hz, dwell"};
+      "FROM point ORDER BY response, freq_hz, dwell"};
   while (rows.step()) {
     StoredPoint point{.dwell = whole<std::uint32_t>(rows, 0),
                       .tone = whole<std::uint32_t>(rows, 1),

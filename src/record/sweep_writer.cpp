@@ -62,7 +62,7 @@ std::string histogram_text(const DwellTiming& timing) {
 struct SweepWriter::Statements {
   explicit Statements(Database& database)
       : run{database, "INSERT OR REPLACE INTO run VALUES (?, ?)"},
-        point{database, "INSERT INTO point VALUES (" + placeholders(24) + ")"},
+        point{database, "INSERT INTO point VALUES (" + placeholders(25) + ")"},
         block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?)"},
         timing{database, "INSERT INTO timing VALUES (?, ?, ?, ?, ?, ?, ?)"},
         event{database, "INSERT INTO event VALUES (NULL, ?, ?, ?, nullif(?, 0), ?, ?, ?)"},
@@ -159,7 +159,7 @@ void SweepWriter::write(const Record& record) {
 
 void SweepWriter::insert(const Point& point) {
   statements_->point
-      .bind(point.dwell, point.tone, point.input, point.output, point.frequency_hz,
+      .bind(point.dwell, point.tone, point.pair, point.input, point.output, point.frequency_hz,
             point.response.real(), point.response.imag(), point.covariance.re_re,
             point.covariance.re_im, point.covariance.im_im, point.dof, point.gain_interval_db,
             point.phase_interval_deg, point.input_amplitude, point.output_amplitude, point.snr_db,

@@ -144,7 +144,7 @@ Progress::Progress(std::ostream& stream, bool terminal, const SweepPlan& plan)
     : stream_{stream}, terminal_{terminal}, plan_{plan}, start_{std::chrono::steady_clock::now()} {}
 
 void Progress::point(const Point& point) {
-  if (point.tone != 0 || point.output != first_sensor_channel) return;
+  if (point.tone != 0 || point.pair != 0) return;
   last_point_ = point_text(point.frequency_hz, point.response, to_string(point.status),
                            to_string(point.reason));
   if (!terminal_) {

@@ -30,7 +30,7 @@ class Progress {
  public:
   Progress(std::ostream& stream, bool terminal, const SweepPlan& plan);
 
-  // A finished point of the first sensor.
+  // A finished point; those of the first response are shown.
   void point(const Point& point);
 
   // Where the loop is.

@@ -2,6 +2,7 @@
 // phasors drive the output and the correlator.
 #pragma once
 
+#include <complex>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -26,6 +27,11 @@ class Excitation {
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
 
   double command() const noexcept SINERIG_NONBLOCKING;
+
+  // The commanded tone as b + j a, on the phasors of the same bin.
+  std::complex<double> commanded(std::size_t tone) const noexcept {
+    return {voices_[tone].in_phase, voices_[tone].quadrature};
+  }
 
   // One per bin: the tones, then the harmonics of the first from the second on.
   std::span<const Phasor> phasors() const noexcept { return {phasors_.data(), bins_}; }

@@ -20,6 +20,9 @@ const char* to_string(TripCause cause) noexcept {
     case TripCause::channel_not_finite: return "channel_not_finite";
     case TripCause::channel_age: return "channel_age";
     case TripCause::actuator_fault: return "actuator_fault";
+    case TripCause::excitation_missing: return "excitation_missing";
+    case TripCause::excitation_other_frequency: return "excitation_other_frequency";
+    case TripCause::excitation_reversed: return "excitation_reversed";
     case TripCause::recorder_stalled: return "recorder_stalled";
     case TripCause::clock_lost: return "clock_lost";
   }
@@ -133,7 +136,7 @@ void Guard::trip(TripCause cause, std::uint32_t channel, double value, double li
 
 std::string describe(const Trip& trip, const std::vector<std::string>& channel_names) {
   const std::string name =
-      trip.channel < channel_names.size() ? channel_names[trip.channel] : "channel";
+      trip.channel < channel_names.size() ? channel_names[trip.channel] : "what was applied";
   const auto with = [&](const char* format, double a, double b) {
     char text[160];
     std::snprintf(text, sizeof text, format, a, b);
@@ -165,6 +168,24 @@ std::string describe(const Trip& trip, const std::vector<std::string>& channel_n
     case TripCause::actuator_fault:
       what =
           with("%.0f faulty writes to the actuator in a row (limit %.0f)", trip.value, trip.limit);
+      break;
+    case TripCause::excitation_missing:
+      what = name + with(
+                        " does not hold the commanded sine: %.3g of its amplitude (at least %.3g); "
+                        "is the drive enabled and the range right?",
+                        trip.value, trip.limit);
+      break;
+    case TripCause::excitation_other_frequency:
+      what =
+          name + with(
+                     " moves at other frequencies than the command: %.3g of its power is where it "
+                     "should be (at least %.3g)",
+                     trip.value, trip.limit);
+      break;
+    case TripCause::excitation_reversed:
+      what =
+          name + with(" moves against the command: phase %.0f° (at most %.0f°); is a sign wrong?",
+                      trip.value, trip.limit);
       break;
     case TripCause::recorder_stalled: what = "the recorder no longer takes points"; break;
     case TripCause::clock_lost: what = "the loop can no longer keep its rate"; break;

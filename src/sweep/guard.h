@@ -29,6 +29,8 @@ struct GuardSettings {
   std::vector<ChannelLimits> channels;  // one per sensor, in order
 };
 
+inline constexpr std::uint32_t no_sensor = 0xffffffff;
+
 enum class TripCause : std::uint8_t {
   none,
   stop_requested,
@@ -40,6 +42,9 @@ enum class TripCause : std::uint8_t {
   channel_not_finite,
   channel_age,
   actuator_fault,
+  excitation_missing,
+  excitation_other_frequency,
+  excitation_reversed,
   recorder_stalled,
   clock_lost,
 };
@@ -50,7 +55,8 @@ const char* to_string(TripCause cause) noexcept;
 // changed to.
 struct Trip {
   TripCause cause = TripCause::none;
-  std::uint32_t channel = 0;  // sensor index where the cause is a channel's
+  std::uint32_t channel =
+      0;  // sensor index where the cause is a channel's; no_sensor: what was applied
   double value = 0.0;
   double limit = 0.0;
   std::uint64_t tick = 0;
@@ -78,6 +84,10 @@ class Guard {
   // A ramp already under way is cut short by `at_once`.
   void stop(TripCause cause, std::uint64_t tick, bool at_once = false) noexcept SINERIG_NONBLOCKING;
 
+  // The same with the figure behind it; `channel` is a sensor's index.
+  void trip(TripCause cause, std::uint32_t channel, double value, double limit,
+            std::uint64_t tick) noexcept SINERIG_NONBLOCKING;
+
   const Trip& trip() const noexcept { return trip_; }
 
   // The ramp has ended: nothing is left but to release.
@@ -90,8 +100,6 @@ class Guard {
     bool seen = false;
   };
 
-  void trip(TripCause cause, std::uint32_t channel, double value, double limit,
-            std::uint64_t tick) noexcept;
   double ramp_down(std::uint64_t ticks) noexcept;
 
   GuardSettings settings_;

@@ -248,6 +248,7 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   const Estimate& estimate = each.estimate;
   Point point;
   point.tone = static_cast<std::uint16_t>(tone);
+  point.pair = static_cast<std::uint16_t>(pair);
   point.input = static_cast<std::uint16_t>(applied_channel + pairs_[pair].input);
   point.output = static_cast<std::uint16_t>(applied_channel + pairs_[pair].output);
   point.frequency_hz = omega_[tone] / (2.0 * std::numbers::pi);

@@ -51,6 +51,10 @@ class Measurement {
                                           static_cast<double>(dwell_->block_samples));
   }
 
+  double block_power(std::size_t channel) const noexcept {
+    return regression_.block_power(channel, static_cast<double>(dwell_->block_samples));
+  }
+
   // Takes the judgement as it stands, for the end of the dwell or a stop in the midst of it.
   void conclude() noexcept SINERIG_NONBLOCKING;
   Point point(std::size_t pair, std::size_t tone) const noexcept SINERIG_NONBLOCKING;

@@ -53,6 +53,7 @@ const char* to_string(PointReason reason) noexcept;
 struct Point {
   std::uint32_t dwell = 0;
   std::uint16_t tone = 0;
+  std::uint16_t pair = 0;  // which of the run's responses
   std::uint16_t input = applied_channel;
   std::uint16_t output = first_sensor_channel;
   PointStatus status = PointStatus::good;

@@ -51,7 +51,7 @@ Regression::Regression(std::size_t channels, std::size_t max_bins, std::size_t c
       offsets_(channels),
       seen_(channels),
       totals_(capacity_width_),
-      block_start_(channels * (2 + 2 * max_bins)),
+      block_start_(channels * (3 + 2 * max_bins)),
       x_(2 + 2 * max_bins),
       shifted_(2 + 2 * max_bins),
       samples_(capacity_),
@@ -124,13 +124,13 @@ void Regression::add(std::span<const Phasor> phasors,
 
 void Regression::begin_block() noexcept {
   for (std::size_t channel = 0; channel < channels_; ++channel) {
-    std::copy_n(&totals_[moments_at(channel)], order(), &block_start_[channel * order()]);
+    std::copy_n(&totals_[moments_at(channel)], order() + 1, &block_start_[channel * (order() + 1)]);
   }
 }
 
 Coefficients Regression::block_coefficients(std::size_t channel, std::size_t bin,
                                             double samples) const noexcept {
-  const double* from = &block_start_[channel * order()];
+  const double* from = &block_start_[channel * (order() + 1)];
   const double* to = &totals_[moments_at(channel)];
   const auto sum = [&](std::size_t row) {
     return to[row] - from[row];
@@ -138,6 +138,13 @@ Coefficients Regression::block_coefficients(std::size_t channel, std::size_t bin
   return {.a = 2.0 / samples * sum(cosine_row(bin)),
           .b = 2.0 / samples * sum(sine_row(bin)),
           .mean = references_[channel] + sum(constant_row) / samples};
+}
+
+double Regression::block_power(std::size_t channel, double samples) const noexcept {
+  const double* from = &block_start_[channel * (order() + 1)];
+  const double* to = &totals_[moments_at(channel)];
+  const double mean = (to[constant_row] - from[constant_row]) / samples;
+  return (to[order()] - from[order()]) / samples - mean * mean;
 }
 
 bool Regression::checkpoint() noexcept {

@@ -61,6 +61,8 @@ class Regression {
   void begin_block() noexcept SINERIG_NONBLOCKING;
   Coefficients block_coefficients(std::size_t channel, std::size_t bin,
                                   double samples) const noexcept SINERIG_NONBLOCKING;
+  // Mean square of a channel in the block, its mean taken out.
+  double block_power(std::size_t channel, double samples) const noexcept SINERIG_NONBLOCKING;
 
   // Ends a part. Keeps the totals up to here, or every stride()-th time only: when the memory is
   // full every second checkpoint goes and the stride doubles. True when a checkpoint was kept.
@@ -113,7 +115,7 @@ class Regression {
   std::vector<std::int64_t> offsets_;
   std::vector<bool> seen_;
   std::vector<double> totals_;
-  std::vector<double> block_start_;  // moments of every channel when the block began
+  std::vector<double> block_start_;  // moments and square of every channel when the block began
   std::vector<double> x_;
   std::vector<double> shifted_;
 

@@ -12,6 +12,9 @@ namespace {
 // A dwell that gaps keep from finishing is given up at this many times its planned length.
 constexpr std::uint64_t max_dwell_stretch = 4;
 
+// The transient of a dwell's beginning is not to be taken for a wrong sign.
+constexpr std::uint32_t blocks_before_check = 2;
+
 std::size_t most_tones(const SweepPlan& plan) {
   std::size_t most = 1;
   for (const Dwell& dwell : plan.dwells) most = std::max(most, dwell.tones.size());
@@ -24,8 +27,8 @@ std::size_t most_bins(const SweepPlan& plan) {
   return most;
 }
 
-// Every sensor over what was applied.
-Pairs over_applied(std::size_t sensors) {
+Pairs responses_of(const RunnerSettings& settings, std::size_t sensors) {
+  if (!settings.responses.empty()) return settings.responses;
   Pairs pairs;
   for (std::size_t i = 0; i < sensors; ++i) pairs.push_back({.input = 0, .output = 1 + i});
   return pairs;
@@ -53,15 +56,16 @@ class ReleaseOnExit {
 SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, Actuator& actuator,
                          std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink)
     : plan_{std::move(plan)},
-      settings_{settings},
+      settings_{std::move(settings)},
       clock_{clock},
       actuator_{actuator},
       sensors_{sensors.begin(), sensors.end()},
       guard_{guard},
       sink_{sink},
       excitation_{most_tones(plan_), most_bins(plan_)},
-      measurement_{1 + sensors.size(),           most_bins(plan_), most_tones(plan_),
-                   over_applied(sensors.size()), plan_.judgement,  plan_.rate_hz},
+      measurement_{1 + sensors.size(), most_bins(plan_),
+                   most_tones(plan_),  responses_of(settings_, sensors.size()),
+                   plan_.judgement,    plan_.rate_hz},
       observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
       range_faults_(sensors.size()) {}
@@ -183,7 +187,10 @@ void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
     --settle_left_;
   } else {
     measurement_.add(excitation_.phasors(), observations_);
-    if (measurement_.block_ended()) put_block(tick);
+    if (measurement_.block_ended()) {
+      put_block(tick);
+      if (blocks_ == blocks_before_check) check_excitation(tick);
+    }
   }
   given_up_ = dwell_ticks_ >= max_dwell_stretch * dwell.max_samples;
   if (!measurement_.done() && !given_up_) return;
@@ -221,6 +228,33 @@ void SweepRunner::put_block(std::uint64_t tick) noexcept {
   ++blocks_;
 }
 
+void SweepRunner::check_excitation(std::uint64_t tick) noexcept {
+  constexpr TripCause causes[] = {TripCause::none, TripCause::excitation_missing,
+                                  TripCause::excitation_other_frequency,
+                                  TripCause::excitation_reversed};
+  const auto refuse = [&](const ExcitationVerdict& verdict, std::uint32_t sensor) {
+    if (verdict.fault == ExcitationFault::none) return;
+    guard_.trip(causes[static_cast<std::size_t>(verdict.fault)], sensor, verdict.value,
+                verdict.limit, tick);
+  };
+  const std::size_t tones = plan_.dwells[dwell_].tones.size();
+  for (std::size_t tone = 0; tone < tones; ++tone) {
+    refuse(check_applied(measurement_.block_coefficients(0, tone).phasor(),
+                         excitation_.commanded(tone), settings_.min_excitation),
+           no_sensor);
+  }
+  for (const std::size_t sensor : settings_.readbacks) {
+    double tone_power = 0.0;
+    for (std::size_t tone = 0; tone < tones; ++tone) {
+      tone_power += 0.5 * std::norm(measurement_.block_coefficients(1 + sensor, tone).phasor());
+    }
+    refuse(
+        check_readback(measurement_.block_coefficients(1 + sensor, 0).phasor(),
+                       excitation_.commanded(0), tone_power, measurement_.block_power(1 + sensor)),
+        static_cast<std::uint32_t>(sensor));
+  }
+}
+
 void SweepRunner::finish_dwell() noexcept {
   const Dwell& dwell = plan_.dwells[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
@@ -238,7 +272,9 @@ Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept
   Point point = measurement_.point(pair, tone);
   point.dwell = dwell_;
   point.seconds = static_cast<double>(dwell_ticks_) / plan_.rate_hz;
-  const double excitation = point.input_amplitude / dwell.tones[tone].amplitude;
+  // Only what was applied is in the unit of the command.
+  const double excitation =
+      point.input == applied_channel ? point.input_amplitude / dwell.tones[tone].amplitude : 1.0;
   const auto sensor = static_cast<std::size_t>(point.output - first_sensor_channel);
   const auto mark = [&](PointStatus status, PointReason reason, double value) {
     point.status = status;

@@ -9,6 +9,7 @@
 #include "drivers/driver.h"
 #include "sweep/clock.h"
 #include "sweep/excitation.h"
+#include "sweep/excitation_check.h"
 #include "sweep/guard.h"
 #include "sweep/measurement.h"
 #include "sweep/plan.h"
@@ -24,6 +25,8 @@ struct RunControl {
 };
 
 struct RunnerSettings {
+  Pairs responses;                     // empty: every sensor over what was applied
+  std::vector<std::size_t> readbacks;  // sensors that read the excitation back
   bool record_samples = false;
   double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
   double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
@@ -53,6 +56,7 @@ class SweepRunner {
   void measure(std::uint64_t tick, bool disturbed) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
   void put_block(std::uint64_t tick) noexcept;
+  void check_excitation(std::uint64_t tick) noexcept;
   void finish_dwell() noexcept;
   Point make_point(std::size_t pair, std::size_t tone) const noexcept;
   void account(const Tick& tick, std::uint64_t ticks) noexcept;
