@@ -94,6 +94,9 @@ SweepSettings read_sweep(const Section& section, double rate_hz) {
   sweep.frequency_tolerance =
       section.number("frequency_tolerance", {.min = 1e-9, .max = 0.1}, sweep.frequency_tolerance);
   read_amplitude(section, sweep);
+  sweep.offset = section.number("offset", any_number, sweep.offset);
+  sweep.bias_amplitude = section.number("bias_amplitude", zero_or_more, sweep.bias_amplitude);
+  if (sweep.bias_amplitude > 0.0) sweep.bias_hz = read_frequency(section, "bias_hz", rate_hz);
   sweep.ramp_s = section.number("ramp_s", {.min = 0.0, .max = 3600.0}, sweep.ramp_s);
   const std::string settling = section.choice("settling", {"detect", "fixed"});
   sweep.settling = settling == "fixed" ? Settling::fixed : Settling::detect;
@@ -225,7 +228,7 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   if (rig.guard.neutral < rig.motion.command_min || rig.guard.neutral > rig.motion.command_max) {
     rig.actuator.section.refuse("neutral", "must lie between [limits] command_min and command_max");
   }
-  rig.sweep.offset = rig.guard.neutral;
+  rig.sweep.neutral = rig.guard.neutral;
   for (const Channel& sensor : rig.sensors) {
     rig.guard.channels.push_back(read_channel_limits(sensor.section));
   }

@@ -59,7 +59,7 @@ bool WindowEstimator::solve(const Regression& regression, const Window& window, 
 }
 
 bool WindowEstimator::estimate(const Regression& regression, const Window& window, const Pair& pair,
-                               std::span<const double> omega_rad_s,
+                               std::span<const double> omega_rad_s, std::size_t harmonics,
                                std::span<Estimate> estimates) noexcept {
   const std::size_t order = regression.order();
   if (!solve(regression, window, pair.input, input_)) return false;
@@ -77,13 +77,13 @@ bool WindowEstimator::estimate(const Regression& regression, const Window& windo
     if (estimate.input == std::complex<double>{}) return false;
   }
   const double noise = output_.variance(order);
-  double harmonics = 0.0;
-  for (std::size_t bin = estimates.size(); bin < omega_rad_s.size(); ++bin) {
+  double distortion = 0.0;
+  for (std::size_t bin = estimates.size(); bin < estimates.size() + harmonics; ++bin) {
     // Three times its expectation is what noise alone exceeds in one bin of twenty.
     const double floor = 3.0 * 4.0 * noise / output_.sums.count;
-    harmonics += std::max(0.0, std::norm(phasor_of(output_.beta, bin)) - floor);
+    distortion += std::max(0.0, std::norm(phasor_of(output_.beta, bin)) - floor);
   }
-  estimates[0].distortion = std::sqrt(harmonics) / std::abs(estimates[0].output);
+  estimates[0].distortion = std::sqrt(distortion) / std::abs(estimates[0].output);
   take_clusters(regression, window, pair, estimates);
   return true;
 }

@@ -61,7 +61,7 @@ class WindowEstimator {
   // One estimate per tone; bins beyond are harmonics of the first. `omega_rad_s` per bin. False
   // where the window does not determine the coefficients.
   bool estimate(const Regression& regression, const Window& window, const Pair& pair,
-                std::span<const double> omega_rad_s,
+                std::span<const double> omega_rad_s, std::size_t harmonics,
                 std::span<Estimate> estimates) noexcept SINERIG_NONBLOCKING;
 
  private:

@@ -5,8 +5,11 @@
 
 namespace sinerig {
 
-Excitation::Excitation(std::size_t max_tones, std::size_t max_bins)
-    : voices_(max_tones), phasors_(max_bins) {}
+Excitation::Excitation(std::size_t max_tones, std::size_t max_bins, const Baseline& baseline)
+    : baseline_{baseline},
+      oscillation_{baseline.oscillation.cycles, baseline.oscillation.samples},
+      voices_(max_tones),
+      phasors_(max_bins) {}
 
 // Of the running single tone, one tick on.
 double Excitation::carried_phase_rad() const noexcept {
@@ -37,6 +40,8 @@ void Excitation::start(const Dwell& dwell, double from_scale) noexcept {
 
 void Excitation::advance(std::uint64_t ticks) noexcept {
   elapsed_ += ticks;
+  run_ticks_ += ticks;
+  oscillation_.advance(ticks);
   for (std::size_t i = 0; i < tones_; ++i) voices_[i].phase.advance(ticks);
   refresh();
 }
@@ -44,14 +49,19 @@ void Excitation::advance(std::uint64_t ticks) noexcept {
 void Excitation::refresh() noexcept {
   for (std::size_t i = 0; i < tones_; ++i) phasors_[i] = voices_[i].phase.phasor();
   const Phasor& tone = phasors_[0];
-  for (std::size_t i = tones_; i < bins_; ++i) {
+  const std::size_t harmonics_end = bins_ - (baseline_.oscillates() ? 1 : 0);
+  for (std::size_t i = tones_; i < harmonics_end; ++i) {
     const Phasor& below = i == tones_ ? tone : phasors_[i - 1];
     phasors_[i] = {.cosine = below.cosine * tone.cosine - below.sine * tone.sine,
                    .sine = below.sine * tone.cosine + below.cosine * tone.sine};
   }
+  if (baseline_.oscillates()) {
+    oscillation_phasor_ = oscillation_.phasor();
+    phasors_[harmonics_end] = oscillation_phasor_;
+  }
 }
 
-double Excitation::command() const noexcept {
+double Excitation::tones() const noexcept {
   double sum = 0.0;
   for (std::size_t i = 0; i < tones_; ++i) {
     sum += voices_[i].in_phase * phasors_[i].sine + voices_[i].quadrature * phasors_[i].cosine;
@@ -59,6 +69,29 @@ double Excitation::command() const noexcept {
   if (elapsed_ >= ramp_samples_) return sum;
   const double progress = static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_);
   return sum * (from_scale_ + (1.0 - from_scale_) * progress);
+}
+
+double Excitation::baseline() const noexcept {
+  const double full = baseline_.offset + baseline_.amplitude * oscillation_phasor_.sine;
+  if (run_ticks_ >= baseline_.ramp_samples) return baseline_.neutral + full;
+  const double progress =
+      static_cast<double>(run_ticks_) / static_cast<double>(baseline_.ramp_samples);
+  return baseline_.neutral + full * progress;
+}
+
+double Excitation::command() const noexcept {
+  if (!closing_) return baseline() + tones();
+  if (elapsed_ >= closing_samples_) return baseline_.neutral;
+  const double left =
+      1.0 - static_cast<double>(elapsed_) / static_cast<double>(closing_samples_);
+  return baseline_.neutral + (closing_from_ - baseline_.neutral) * left;
+}
+
+void Excitation::close() noexcept {
+  closing_from_ = command();
+  closing_samples_ = baseline_.ramp_samples;
+  elapsed_ = 0;
+  closing_ = true;
 }
 
 }  // namespace sinerig

@@ -1,5 +1,6 @@
-// The command of a dwell: its tones on integer phase, under one amplitude envelope. The same
-// phasors drive the output and the correlator.
+// The command: the tones of a dwell on integer phase under one amplitude envelope, laid on a baseline
+// (an offset, a slow oscillation) that runs through all dwells. The same phasors drive the output and
+// the regression.
 #pragma once
 
 #include <complex>
@@ -15,7 +16,7 @@ namespace sinerig {
 
 class Excitation {
  public:
-  Excitation(std::size_t max_tones, std::size_t max_bins);
+  Excitation(std::size_t max_tones, std::size_t max_bins, const Baseline& baseline);
 
   // Begins a dwell. A single tone goes on from the phase that the single tone before has reached,
   // so that the command has no step; after whole cycles that is zero. Over the ramp the envelope
@@ -28,12 +29,17 @@ class Excitation {
 
   double command() const noexcept SINERIG_NONBLOCKING;
 
+  // The end of the sweep: from here on the command goes from where it is to neutral.
+  void close() noexcept SINERIG_NONBLOCKING;
+  bool closed() const noexcept { return closing_ && elapsed_ >= closing_samples_; }
+
   // The commanded tone as b + j a, on the phasors of the same bin.
   std::complex<double> commanded(std::size_t tone) const noexcept {
     return {voices_[tone].in_phase, voices_[tone].quadrature};
   }
 
-  // One per bin: the tones, then the harmonics of the first from the second on.
+  // One per bin: the tones, the harmonics of the first from the second on, the oscillation of the
+  // baseline where there is one.
   std::span<const Phasor> phasors() const noexcept { return {phasors_.data(), bins_}; }
 
  private:
@@ -45,8 +51,14 @@ class Excitation {
   };
 
   double carried_phase_rad() const noexcept;
+  double tones() const noexcept;
+  double baseline() const noexcept;
   void refresh() noexcept;
 
+  Baseline baseline_;
+  PhaseCounter oscillation_;
+  Phasor oscillation_phasor_;
+  std::uint64_t run_ticks_ = 0;
   std::vector<Voice> voices_;
   std::vector<Phasor> phasors_;
   std::size_t tones_ = 0;
@@ -54,6 +66,9 @@ class Excitation {
   std::uint64_t elapsed_ = 0;
   std::uint64_t ramp_samples_ = 0;
   double from_scale_ = 1.0;
+  bool closing_ = false;
+  std::uint64_t closing_samples_ = 0;
+  double closing_from_ = 0.0;
 };
 
 }  // namespace sinerig

@@ -51,12 +51,10 @@ void Measurement::start(const Dwell& dwell) noexcept {
   dwell_ = &dwell;
   const double per_cycle =
       2.0 * std::numbers::pi * rate_hz_ / static_cast<double>(dwell.block_samples);
-  const std::size_t tones = dwell.tones.size();
-  for (std::size_t bin = 0; bin < dwell.bins(); ++bin) {
-    const std::uint64_t cycles =
-        bin < tones ? dwell.tones[bin].cycles : dwell.tones[0].cycles * (bin - tones + 2);
-    omega_[bin] = per_cycle * static_cast<double>(cycles);
-  }
+  std::size_t bin = 0;
+  for (const Tone& tone : dwell.tones) omega_[bin++] = per_cycle * static_cast<double>(tone.cycles);
+  for (std::uint32_t order = 2; order <= dwell.harmonics; ++order) omega_[bin++] = order * omega_[0];
+  if (dwell.bias_hz > 0.0) omega_[bin++] = 2.0 * std::numbers::pi * dwell.bias_hz;
   regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
                     static_cast<double>(dwell.block_samples));
   std::fill(results_.begin(), results_.end(), Result{});
@@ -131,7 +129,7 @@ bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {
   const std::size_t tones = dwell_->tones.size();
   const bool solved =
       estimator_.estimate(regression_, window, pairs_[pair], {omega_.data(), dwell_->bins()},
-                          {estimates_.data(), tones});
+                          dwell_->harmonic_bins(), {estimates_.data(), tones});
   for (std::size_t tone = 0; tone < tones; ++tone) {
     Result& each = result(pair, tone);
     each.known = solved;
@@ -157,7 +155,7 @@ bool Measurement::late_half_agrees(const Window& window) noexcept {
   late.first = window.first + (window.last - window.first + 1) / 2;
   const std::size_t tones = dwell_->tones.size();
   if (!estimator_.estimate(regression_, late, pairs_[0], {omega_.data(), dwell_->bins()},
-                           {estimates_.data(), tones})) {
+                           dwell_->harmonic_bins(), {estimates_.data(), tones})) {
     return false;
   }
   bool agrees = true;

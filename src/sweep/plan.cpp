@@ -67,11 +67,13 @@ void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double
                           " Hz: exceeds [limits] " + limit_key + " = " + number(limit) +
                           "; lower the amplitude there or raise the limit");
   };
-  if (sweep.offset + amplitude > limits.command_max) {
-    refuse("a command", sweep.offset + amplitude, "command_max", limits.command_max);
+  const double baseline = sweep.neutral + sweep.offset;
+  const double reach = amplitude + sweep.bias_amplitude;
+  if (baseline + reach > limits.command_max) {
+    refuse("a command", baseline + reach, "command_max", limits.command_max);
   }
-  if (sweep.offset - amplitude < limits.command_min) {
-    refuse("a command", sweep.offset - amplitude, "command_min", limits.command_min);
+  if (baseline - reach < limits.command_min) {
+    refuse("a command", baseline - reach, "command_min", limits.command_min);
   }
   if (slew_per_s > limits.slew_per_s) {
     refuse("a slew", slew_per_s, "slew_per_s", limits.slew_per_s);
@@ -143,6 +145,16 @@ Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz) {
   return dwell;
 }
 
+Baseline make_baseline(const SweepSettings& sweep, double rate_hz) {
+  Baseline baseline{.neutral = sweep.neutral, .offset = sweep.offset};
+  baseline.ramp_samples = static_cast<std::uint64_t>(std::ceil(sweep.ramp_s * rate_hz - 1e-9));
+  if (sweep.bias_amplitude > 0.0) {
+    baseline.amplitude = sweep.bias_amplitude;
+    baseline.oscillation = snap(sweep.bias_hz, rate_hz, sweep.frequency_tolerance);
+  }
+  return baseline;
+}
+
 bool same_frequency(const Dwell& a, const Dwell& b) {
   return a.tones.front().cycles * b.block_samples == b.tones.front().cycles * a.block_samples;
 }
@@ -191,7 +203,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   }
   check_band(frequencies_hz, sweep, rate_hz);
 
-  SweepPlan plan{.rate_hz = rate_hz, .offset = sweep.offset, .dwells = {}};
+  SweepPlan plan{.rate_hz = rate_hz, .baseline = make_baseline(sweep, rate_hz), .dwells = {}};
   plan.judgement = {.settling = sweep.settling,
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,
@@ -204,6 +216,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
     if (duplicate) continue;
     check_motion(sweep, limits, dwell.frequency_hz(rate_hz), dwell.tones.front().amplitude,
                  rate_hz);
+    if (plan.baseline.oscillates()) dwell.bias_hz = plan.baseline.oscillation.hz(rate_hz);
     plan.dwells.push_back(std::move(dwell));
   }
   return plan;

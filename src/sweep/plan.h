@@ -38,7 +38,10 @@ struct SweepSettings {
   std::vector<double> frequencies_hz;  // for Spacing::list, in the order to be run
   double frequency_tolerance = 1e-3;   // relative, for the snap to whole cycles in whole samples
 
-  double offset = 0.0;                          // the command that the sines are laid on
+  double neutral = 0.0;                         // the command at rest
+  double offset = 0.0;                          // from neutral: what the sines are laid on …
+  double bias_amplitude = 0.0;                  // … and a slow oscillation about it,
+  double bias_hz = 0.0;                         // which keeps a servo out of stiction
   double amplitude = 0.0;                       // unit of the command
   std::vector<AmplitudeBreak> amplitude_table;  // log-log interpolation, held beyond its ends
   double follow_velocity = unlimited;           // A·ω is kept at or below this
@@ -82,6 +85,7 @@ struct Dwell {
   std::uint32_t parts = 1;          // a block is cut into this many, a power of two
   std::vector<Tone> tones;
   std::uint32_t harmonics = 1;       // highest harmonic of the first tone in the regression
+  double bias_hz = 0.0;              // oscillation of the baseline, a bin of its own; 0 = none
   std::uint64_t ramp_samples = 0;    // at the start of the wait
   std::uint64_t settle_samples = 0;  // ramp included; waited for before anything is measured
   std::uint32_t blocks = 0;          // measured at least
@@ -92,7 +96,19 @@ struct Dwell {
     return rate_hz * static_cast<double>(tone.cycles) / static_cast<double>(block_samples);
   }
   double frequency_hz(double rate_hz) const { return tone_hz(tones.front(), rate_hz); }
-  std::size_t bins() const { return tones.size() + harmonics - 1; }
+  std::size_t harmonic_bins() const { return harmonics - 1; }
+  std::size_t bins() const { return tones.size() + harmonic_bins() + (bias_hz > 0.0 ? 1 : 0); }
+};
+
+// What the tones are laid on, through all dwells; reached from neutral over a ramp.
+struct Baseline {
+  double neutral = 0.0;
+  double offset = 0.0;     // from neutral
+  double amplitude = 0.0;  // of a slow oscillation
+  CoherentFrequency oscillation{};
+  std::uint64_t ramp_samples = 0;
+
+  bool oscillates() const { return amplitude > 0.0; }
 };
 
 // When a dwell has been measured well enough; the same for all dwells of a sweep.
@@ -107,7 +123,7 @@ struct Judgement {
 
 struct SweepPlan {
   double rate_hz = 0.0;
-  double offset = 0.0;  // the command that the tones are laid on
+  Baseline baseline{};
   std::vector<Dwell> dwells;
   Judgement judgement{};
 

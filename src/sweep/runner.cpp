@@ -62,7 +62,7 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       sensors_{sensors.begin(), sensors.end()},
       guard_{guard},
       sink_{sink},
-      excitation_{most_tones(plan_), most_bins(plan_)},
+      excitation_{most_tones(plan_), most_bins(plan_), plan_.baseline},
       measurement_{1 + sensors.size(), most_bins(plan_),
                    most_tones(plan_),  responses_of(settings_, sensors.size()),
                    plan_.judgement,    plan_.rate_hz},
@@ -94,7 +94,8 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool first = outcome_.ticks == 0;
   const std::uint64_t ticks = first ? 1 : tick.index - last_tick_;
 
-  const bool new_dwell = dwell_ticks_ == 0;
+  const bool closing = dwell_ == plan_.dwells.size();
+  const bool new_dwell = !closing && dwell_ticks_ == 0;
   if (new_dwell) begin_dwell(first ? 0 : last_tick_ + 1);
   excitation_.advance(new_dwell ? ticks - 1 : ticks);
   dwell_ticks_ += ticks;
@@ -104,22 +105,27 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (stop_requests > 0) {
     guard_.stop(TripCause::stop_requested, tick.index, stop_requests > 1);
   }
-  command_ = guard_.admit(plan_.offset + excitation_.command(), tick.index, ticks);
+  command_ = guard_.admit(excitation_.command(), tick.index, ticks);
   exchange(command_, tick);
   control.tick.store(tick.index, std::memory_order_relaxed);
   control.dwell.store(dwell_, std::memory_order_relaxed);
 
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
-    measurement_.conclude();
-    finish_dwell();
+    if (!closing) {
+      measurement_.conclude();
+      finish_dwell();
+    }
     return false;
   }
+  if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
   measure(tick.index, ticks > 1 || late || command_lost_);
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
-  return dwell_ < plan_.dwells.size();
+  if (dwell_ < plan_.dwells.size()) return true;
+  excitation_.close();
+  return !excitation_.closed();
 }
 
 // Write, then read, in the same tick; the guard sees all of it.
