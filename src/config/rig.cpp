@@ -88,12 +88,25 @@ Span read_span(const Section& section, const std::string& name, Span fallback, R
           .seconds = section.number(name + "_s", zero_or_more, fallback.seconds)};
 }
 
+Level read_level(const Section& section) {
+  Level level;
+  level.response = section.number("level", zero_or_more, level.response);
+  if (!level.wanted()) return level;
+  level.most_response = section.number("level_max", above_zero, 3.0 * level.response);
+  if (level.most_response < level.response) section.refuse("level_max", "must not be below level");
+  level.least_amplitude = section.number("amplitude_min", above_zero);
+  level.retries = static_cast<std::uint32_t>(
+      section.integer("retries", {.min = 0.0, .max = 10.0}, level.retries));
+  return level;
+}
+
 SweepSettings read_sweep(const Section& section, double rate_hz) {
   SweepSettings sweep;
   read_frequencies(section, rate_hz, sweep);
   sweep.frequency_tolerance =
       section.number("frequency_tolerance", {.min = 1e-9, .max = 0.1}, sweep.frequency_tolerance);
   read_amplitude(section, sweep);
+  sweep.level = read_level(section);
   sweep.offset = section.number("offset", any_number, sweep.offset);
   sweep.bias_amplitude = section.number("bias_amplitude", zero_or_more, sweep.bias_amplitude);
   if (sweep.bias_amplitude > 0.0) sweep.bias_hz = read_frequency(section, "bias_hz", rate_hz);

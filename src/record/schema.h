@@ -72,6 +72,7 @@ CREATE TABLE point (            -- H = Y/U at one frequency, written when its dw
 CREATE TABLE block (            -- plain sums of a complete block: y ~ mean + a cos(ωt) + b sin(ωt),
                                 -- t = 0 at the start of the dwell
   dwell      INTEGER NOT NULL,
+  attempt    INTEGER NOT NULL,  -- more than one where the level was corrected; the last one counts
   block      INTEGER NOT NULL,
   tone       INTEGER NOT NULL,
   channel    INTEGER NOT NULL,
@@ -79,7 +80,7 @@ CREATE TABLE block (            -- plain sums of a complete block: y ~ mean + a 
   a          REAL,
   b          REAL,
   mean       REAL,
-  PRIMARY KEY (dwell, block, tone, channel)
+  PRIMARY KEY (dwell, attempt, block, tone, channel)
 ) WITHOUT ROWID;
 
 CREATE TABLE timing (           -- of the loop, per dwell

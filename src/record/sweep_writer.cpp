@@ -63,7 +63,7 @@ struct SweepWriter::Statements {
   explicit Statements(Database& database)
       : run{database, "INSERT OR REPLACE INTO run VALUES (?, ?)"},
         point{database, "INSERT INTO point VALUES (" + placeholders(25) + ")"},
-        block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?)"},
+        block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"},
         timing{database, "INSERT INTO timing VALUES (?, ?, ?, ?, ?, ?, ?)"},
         event{database, "INSERT INTO event VALUES (NULL, ?, ?, ?, nullif(?, 0), ?, ?, ?)"},
         sample{database, "INSERT INTO sample VALUES (?, ?, ?)"} {}
@@ -170,7 +170,7 @@ void SweepWriter::insert(const Point& point) {
 
 void SweepWriter::insert(const Block& block) {
   statements_->block
-      .bind(block.dwell, block.block, block.tone, block.channel, block.first_tick,
+      .bind(block.dwell, block.attempt, block.block, block.tone, block.channel, block.first_tick,
             block.coefficients.a, block.coefficients.b, block.coefficients.mean)
       .run();
 }

@@ -1,5 +1,6 @@
 #include "sweep/excitation.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -20,19 +21,24 @@ double Excitation::carried_phase_rad() const noexcept {
   return std::atan2(at.sine, at.cosine) + voices_[0].start_rad;
 }
 
-void Excitation::start(const Dwell& dwell, double from_scale) noexcept {
+void Excitation::start(const Dwell& dwell, double scale) noexcept {
   const double carried = tones_ == 1 && dwell.tones.size() == 1 ? carried_phase_rad() : 0.0;
   tones_ = dwell.tones.size();
   bins_ = dwell.bins();
   elapsed_ = 0;
   ramp_samples_ = dwell.ramp_samples;
-  from_scale_ = from_scale;
+  double loudness = 0.0;
+  for (const Tone& tone : dwell.tones) loudness = std::max(loudness, scale * tone.amplitude);
+  // Only upward: a larger amplitude carried into a dwell would exceed what its plan was checked
+  // for.
+  from_scale_ = std::min(1.0, loudness_ / loudness);
+  loudness_ = loudness;
   for (std::size_t i = 0; i < tones_; ++i) {
     const Tone& tone = dwell.tones[i];
     const double start_rad = std::remainder(tone.phase_rad + carried, 2.0 * std::numbers::pi);
     voices_[i] = {.phase = PhaseCounter{tone.cycles, dwell.block_samples},
-                  .in_phase = tone.amplitude * std::cos(start_rad),
-                  .quadrature = tone.amplitude * std::sin(start_rad),
+                  .in_phase = scale * tone.amplitude * std::cos(start_rad),
+                  .quadrature = scale * tone.amplitude * std::sin(start_rad),
                   .start_rad = start_rad};
   }
   refresh();
@@ -82,8 +88,7 @@ double Excitation::baseline() const noexcept {
 double Excitation::command() const noexcept {
   if (!closing_) return baseline() + tones();
   if (elapsed_ >= closing_samples_) return baseline_.neutral;
-  const double left =
-      1.0 - static_cast<double>(elapsed_) / static_cast<double>(closing_samples_);
+  const double left = 1.0 - static_cast<double>(elapsed_) / static_cast<double>(closing_samples_);
   return baseline_.neutral + (closing_from_ - baseline_.neutral) * left;
 }
 

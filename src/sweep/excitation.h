@@ -1,6 +1,6 @@
-// The command: the tones of a dwell on integer phase under one amplitude envelope, laid on a baseline
-// (an offset, a slow oscillation) that runs through all dwells. The same phasors drive the output and
-// the regression.
+// The command: the tones of a dwell on integer phase under one amplitude envelope, laid on a
+// baseline (an offset, a slow oscillation) that runs through all dwells. The same phasors drive the
+// output and the regression.
 #pragma once
 
 #include <complex>
@@ -20,9 +20,9 @@ class Excitation {
 
   // Begins a dwell. A single tone goes on from the phase that the single tone before has reached,
   // so that the command has no step; after whole cycles that is zero. Over the ramp the envelope
-  // moves from `from_scale` to 1 (a scale of the dwell's own amplitude: the amplitude has no step
-  // either).
-  void start(const Dwell& dwell, double from_scale) noexcept SINERIG_NONBLOCKING;
+  // moves from the amplitude of the dwell before to `scale` times the planned one: no step there
+  // either.
+  void start(const Dwell& dwell, double scale) noexcept SINERIG_NONBLOCKING;
 
   // Moves on by `ticks`.
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
@@ -65,7 +65,8 @@ class Excitation {
   std::size_t bins_ = 0;
   std::uint64_t elapsed_ = 0;
   std::uint64_t ramp_samples_ = 0;
-  double from_scale_ = 1.0;
+  double loudness_ = 0.0;    // largest amplitude of the running dwell
+  double from_scale_ = 1.0;  // where the envelope begins, of the running dwell's amplitudes
   bool closing_ = false;
   std::uint64_t closing_samples_ = 0;
   double closing_from_ = 0.0;

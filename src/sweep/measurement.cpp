@@ -53,7 +53,8 @@ void Measurement::start(const Dwell& dwell) noexcept {
       2.0 * std::numbers::pi * rate_hz_ / static_cast<double>(dwell.block_samples);
   std::size_t bin = 0;
   for (const Tone& tone : dwell.tones) omega_[bin++] = per_cycle * static_cast<double>(tone.cycles);
-  for (std::uint32_t order = 2; order <= dwell.harmonics; ++order) omega_[bin++] = order * omega_[0];
+  for (std::uint32_t order = 2; order <= dwell.harmonics; ++order)
+    omega_[bin++] = order * omega_[0];
   if (dwell.bias_hz > 0.0) omega_[bin++] = 2.0 * std::numbers::pi * dwell.bias_hz;
   regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
                     static_cast<double>(dwell.block_samples));

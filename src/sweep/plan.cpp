@@ -203,7 +203,10 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   }
   check_band(frequencies_hz, sweep, rate_hz);
 
-  SweepPlan plan{.rate_hz = rate_hz, .baseline = make_baseline(sweep, rate_hz), .dwells = {}};
+  SweepPlan plan{.rate_hz = rate_hz,
+                 .baseline = make_baseline(sweep, rate_hz),
+                 .level = sweep.level,
+                 .dwells = {}};
   plan.judgement = {.settling = sweep.settling,
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,

@@ -30,6 +30,16 @@ struct Span {
   double seconds = 0.0;
 };
 
+// The amplitude of the response that the command is to be fitted to, within its planned amplitude.
+struct Level {
+  double response = 0.0;       // wanted amplitude of the first response's output; 0 = no levelling
+  double most_response = 0.0;  // more than this is tried again
+  double least_amplitude = 0.0;  // of the command; where the first dwell begins
+  std::uint32_t retries = 2;
+
+  bool wanted() const { return response > 0.0; }
+};
+
 struct SweepSettings {
   Spacing spacing = Spacing::logarithmic;
   double start_hz = 0.0;
@@ -47,6 +57,7 @@ struct SweepSettings {
   double follow_velocity = unlimited;           // A·ω is kept at or below this
   double follow_acceleration = unlimited;       // A·ω² is kept at or below this
 
+  Level level{};
   double ramp_s = 0.0;  // the amplitude moves from that of the last dwell to its own
 
   Settling settling = Settling::detect;
@@ -124,6 +135,7 @@ struct Judgement {
 struct SweepPlan {
   double rate_hz = 0.0;
   Baseline baseline{};
+  Level level{};
   std::vector<Dwell> dwells;
   Judgement judgement{};
 

@@ -78,6 +78,7 @@ struct Point {
 // Per-block coefficients of one channel at one tone.
 struct Block {
   std::uint32_t dwell = 0;
+  std::uint32_t attempt = 0;  // more than one where the level was corrected
   std::uint32_t block = 0;
   std::uint16_t tone = 0;
   std::uint16_t channel = 0;
@@ -102,6 +103,7 @@ struct DwellTiming {
 enum class EventKind : std::uint8_t {
   started,
   dwell_began,
+  retried,         // value: amplitude of the next try
   gap,             // value: ticks skipped
   actuator_fault,  // detail: Fault
   sensor_fault,    // channel, detail: Fault; the first of a run of them

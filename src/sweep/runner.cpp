@@ -34,12 +34,6 @@ Pairs responses_of(const RunnerSettings& settings, std::size_t sensors) {
   return pairs;
 }
 
-double largest_amplitude(const Dwell& dwell) {
-  double largest = 0.0;
-  for (const Tone& tone : dwell.tones) largest = std::max(largest, tone.amplitude);
-  return largest;
-}
-
 class ReleaseOnExit {
  public:
   explicit ReleaseOnExit(Actuator& actuator) : actuator_{actuator} {}
@@ -63,6 +57,7 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       guard_{guard},
       sink_{sink},
       excitation_{most_tones(plan_), most_bins(plan_), plan_.baseline},
+      leveller_{plan_.level},
       measurement_{1 + sensors.size(), most_bins(plan_),
                    most_tones(plan_),  responses_of(settings_, sensors.size()),
                    plan_.judgement,    plan_.rate_hz},
@@ -201,15 +196,32 @@ void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
   given_up_ = dwell_ticks_ >= max_dwell_stretch * dwell.max_samples;
   if (!measurement_.done() && !given_up_) return;
   measurement_.conclude();
+  if (try_again()) return;
   finish_dwell();
+  attempt_ = 0;
   ++dwell_;
   ++outcome_.dwells_done;
 }
 
+bool SweepRunner::try_again() noexcept {
+  const double planned = plan_.dwells[dwell_].tones.front().amplitude;
+  const std::optional<double> scale = leveller_.retry(make_point(0, 0), scale_, planned);
+  if (!scale) return false;
+  announce(
+      {.kind = EventKind::retried, .dwell = dwell_, .tick = last_tick_, .value = *scale * planned});
+  scale_ = *scale;
+  ++attempt_;
+  outcome_.skipped_ticks += timing_.skipped;
+  dwell_ticks_ = 0;
+  return true;
+}
+
 void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
   const Dwell& dwell = plan_.dwells[dwell_];
-  const double amplitude_before = dwell_ == 0 ? 0.0 : largest_amplitude(plan_.dwells[dwell_ - 1]);
-  excitation_.start(dwell, amplitude_before / largest_amplitude(dwell));
+  if (attempt_ == 0) {
+    scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
+  }
+  excitation_.start(dwell, scale_);
   measurement_.start(dwell);
   settle_left_ = dwell.settle_samples;
   blocks_ = 0;
@@ -224,6 +236,7 @@ void SweepRunner::put_block(std::uint64_t tick) noexcept {
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
     for (std::size_t channel = 0; channel < observations_.size(); ++channel) {
       sink_.put(Block{.dwell = dwell_,
+                      .attempt = attempt_,
                       .block = blocks_,
                       .tone = static_cast<std::uint16_t>(tone),
                       .channel = static_cast<std::uint16_t>(applied_channel + channel),
@@ -279,8 +292,9 @@ Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept
   point.dwell = dwell_;
   point.seconds = static_cast<double>(dwell_ticks_) / plan_.rate_hz;
   // Only what was applied is in the unit of the command.
-  const double excitation =
-      point.input == applied_channel ? point.input_amplitude / dwell.tones[tone].amplitude : 1.0;
+  const double excitation = point.input == applied_channel
+                                ? point.input_amplitude / (scale_ * dwell.tones[tone].amplitude)
+                                : 1.0;
   const auto sensor = static_cast<std::size_t>(point.output - first_sensor_channel);
   const auto mark = [&](PointStatus status, PointReason reason, double value) {
     point.status = status;

@@ -11,6 +11,7 @@
 #include "sweep/excitation.h"
 #include "sweep/excitation_check.h"
 #include "sweep/guard.h"
+#include "sweep/leveller.h"
 #include "sweep/measurement.h"
 #include "sweep/plan.h"
 #include "sweep/records.h"
@@ -57,6 +58,7 @@ class SweepRunner {
   void begin_dwell(std::uint64_t tick) noexcept;
   void put_block(std::uint64_t tick) noexcept;
   void check_excitation(std::uint64_t tick) noexcept;
+  bool try_again() noexcept;
   void finish_dwell() noexcept;
   Point make_point(std::size_t pair, std::size_t tone) const noexcept;
   void account(const Tick& tick, std::uint64_t ticks) noexcept;
@@ -72,6 +74,7 @@ class SweepRunner {
   RecordSink& sink_;
 
   Excitation excitation_;
+  Leveller leveller_;
   Measurement measurement_;
   std::vector<Observation> observations_;    // applied, sensors: this tick
   double command_ = 0.0;                     // this tick
@@ -81,6 +84,8 @@ class SweepRunner {
   std::uint32_t dwell_ = 0;
   std::uint32_t blocks_ = 0;
   std::uint64_t settle_left_ = 0;
+  double scale_ = 1.0;             // of this dwell's planned amplitudes
+  std::uint32_t attempt_ = 0;      // at this dwell; scale_ is set already where it is not the first
   std::uint64_t dwell_ticks_ = 0;  // grid ticks since the dwell began; 0: it has to begin
   bool given_up_ = false;
   bool command_lost_ = false;
