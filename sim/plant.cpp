@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <stdexcept>
 
 namespace sinerig::sim {
@@ -105,8 +106,9 @@ void Plant::advance(double ticks) noexcept {
     step(ticks);
     return;
   }
-  const double pieces = std::ceil(ticks * friction_substeps);
-  for (double i = 0.0; i < pieces; i += 1.0) step_with_friction(ticks / pieces);
+  const auto pieces = static_cast<std::int64_t>(std::ceil(ticks * friction_substeps));
+  const double substep = ticks / static_cast<double>(pieces);
+  for (std::int64_t i = 0; i < pieces; ++i) step_with_friction(substep);
 }
 
 void Plant::step(double ticks) noexcept {
@@ -177,9 +179,9 @@ void Plant::learn(Transition& slot, double ticks) noexcept {
 // x(t + h) = x + Σ (A h)^k / k! · (A x + b u) h / (k + 1): the exponential series on a vector, in
 // pieces short enough for it to converge to the last bit in some twenty terms.
 void Plant::integrate(std::span<double> state, double input, double ticks) noexcept {
-  const double pieces = std::max(1.0, std::ceil(2.0 * norm_ * ticks));
-  const double h = ticks / pieces;
-  for (double piece = 0.0; piece < pieces; piece += 1.0) {
+  const auto pieces = static_cast<std::int64_t>(std::max(1.0, std::ceil(2.0 * norm_ * ticks)));
+  const double h = ticks / static_cast<double>(pieces);
+  for (std::int64_t piece = 0; piece < pieces; ++piece) {
     for (std::size_t i = 0; i < n_; ++i) {
       term_[i] = (dot(&a_[i * n_], state.data(), n_) + b_[i] * input) * h;
     }

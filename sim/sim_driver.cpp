@@ -10,7 +10,6 @@ namespace {
 
 using config::above_zero;
 using config::any_number;
-using config::ConfigError;
 using config::fraction_of_one;
 using config::Section;
 using config::zero_or_more;

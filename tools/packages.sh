@@ -1,5 +1,6 @@
 # shellcheck shell=bash
-# Sourced by run, test and bench: the Debian packages the project needs, installed when missing.
+# Sourced by the tools beside it: the Debian packages the project needs, installed when missing, and
+# the steps the tools share.
 
 build_packages=(
   cmake ninja-build g++ pkg-config
@@ -7,17 +8,32 @@ build_packages=(
   libtomlplusplus-dev libcli11-dev libsqlite3-dev nlohmann-json3-dev
 )
 
+# usage TOOL : the comment at its head.
+usage() { sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$1"; }
+
+# misuse TOOL MESSAGE : what was wrong, how to call it instead, exit code 2.
+misuse() {
+  echo "${1##*/}: $2" >&2
+  usage "$1" >&2
+  exit 2
+}
+
 # need PACKAGE… : installs what is missing, as root or through sudo; otherwise prints the line to run and stops.
 need() {
-  local missing=() package
+  if ! command -v dpkg-query >/dev/null; then
+    echo "No Debian here: taking it that what these packages hold is installed: $*" >&2
+    return 0
+  fi
+  local installed missing=() package
+  installed=" $(dpkg-query -W -f '${Package}:${db:Status-Status} ' "$@" 2>/dev/null || true)"
   for package in "$@"; do
-    [ "$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null)" = installed ] || missing+=("$package")
+    [[ $installed == *" $package:installed "* ]] || missing+=("$package")
   done
   [ ${#missing[@]} -eq 0 ] && return 0
 
   local as=()
   if [ "$(id -u)" -ne 0 ]; then
-    if command -v sudo >/dev/null && sudo -n true 2>/dev/null || { [ -t 0 ] && command -v sudo >/dev/null; }; then
+    if command -v sudo >/dev/null && { sudo -n true 2>/dev/null || [ -t 0 ]; }; then
       as=(sudo)
     else
       echo "These Debian packages are missing; run this line as root, then call again:" >&2
@@ -25,14 +41,34 @@ need() {
       exit 1
     fi
   fi
-  echo "Installing: ${missing[*]}" >&2
-  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get update -qq >&2
-  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install --yes -qq --no-install-recommends "${missing[@]}" >&2
+  echo "Installing (some minutes on a fresh machine): ${missing[*]}" >&2
+  # A fresh machine is often still busy with its own upgrades: wait for the lock. Of apt's chatter only
+  # what went wrong is worth reading.
+  local log
+  log=$(mktemp)
+  if ! {
+    "${as[@]}" apt-get -o DPkg::Lock::Timeout=300 update -q &&
+      "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 install \
+        --yes -q --no-install-recommends "${missing[@]}"
+  } </dev/null >"$log" 2>&1; then
+    tail -n 20 "$log" >&2
+    rm -f "$log"
+    echo "The packages could not be installed (above: the end of what apt said)." >&2
+    exit 1
+  fi
+  rm -f "$log"
 }
 
-# build PRESET [TARGET] : configures once, then builds what changed.
+# configure PRESET : once, and again when the presets have changed.
+configure() {
+  local tree="$root/build/$1"
+  if [ ! -f "$tree/build.ninja" ] || [ "$root/CMakePresets.json" -nt "$tree/CMakeCache.txt" ]; then
+    (cd "$root" && cmake --preset "$1" >&2)
+  fi
+}
+
+# build PRESET [TARGET] : builds what changed.
 build() {
-  local preset=$1 target=${2:-all}
-  [ -f "$root/build/$preset/build.ninja" ] || cmake -S "$root" --preset "$preset" >&2
-  cmake --build "$root/build/$preset" --target "$target" >&2
+  configure "$1"
+  cmake --build "$root/build/$1" --target "${2:-all}" >&2
 }

@@ -178,6 +178,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   writer.finish();
 
   report::print_run(std::cout, record::read_sweep(path));
+  std::cout.flush();  // before the messages on standard error
   if (outcome.trip.tripped()) spdlog::error("{}", reason);
   if (outbox.dropped_samples() > 0) {
     spdlog::warn("{} samples were dropped: the disk is too slow for [output] samples",

@@ -149,7 +149,7 @@ ChannelLimits read_channel_limits(const Section& sensor) {
   return limits;
 }
 
-Channel read_channel(Section section, const std::string& name) {
+Channel read_channel(const Section& section, const std::string& name) {
   return {.name = name,
           .unit = section.text("unit", "1"),
           .driver = section.text("driver", "sim"),

@@ -111,6 +111,7 @@ std::vector<Section> RigFile::children(std::string_view parent) {
   std::stable_sort(found.begin(), found.end(),
                    [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<Section> children;
+  children.reserve(found.size());
   for (auto& [line, child] : found) children.push_back(std::move(child));
   return children;
 }

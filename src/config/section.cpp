@@ -138,7 +138,7 @@ std::string Section::text(std::string_view key, std::string_view fallback) const
 
 std::string Section::choice(std::string_view key,
                             std::initializer_list<std::string_view> options) const {
-  const std::string value = text(key, *options.begin());
+  std::string value = text(key, *options.begin());
   if (std::find(options.begin(), options.end(), value) != options.end()) return value;
   std::string rule = "must be one of";
   for (const std::string_view option : options) rule += " \"" + std::string{option} + "\"";

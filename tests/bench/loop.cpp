@@ -39,7 +39,7 @@ void plant_only(benchmark::State& state) {
   sim::Plant plant{fourth_order(), 1.0 / rate_hz};
   double output = 0.0;
   std::uint64_t tick = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     const sim::PlantTime now{.tick = tick++, .fraction = 0.0};
     plant.apply(1.0, now);
     plant.sample(now, {&output, 1});
@@ -55,7 +55,7 @@ void whole_loop(benchmark::State& state) {
   rig_settings.system = fourth_order();
   rig_settings.sensors.resize(1);
   std::uint64_t ticks = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] auto _ : state) {
     VirtualClock clock{TickGrid{rate_hz}};
     sim::SimulatedRig rig{rig_settings, clock};
     Sensor* const sensors[] = {&rig.sensor(0)};

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "support/outside_the_loop.h"
 #include "sweep/records.h"
 
 namespace sinerig::test {
@@ -10,12 +11,16 @@ namespace sinerig::test {
 class CollectingSink final : public RecordSink {
  public:
   void put(const Record& record) noexcept override {
+    const OutsideTheLoop noting_down;
     if (const auto* point = std::get_if<Point>(&record)) points.push_back(*point);
     if (const auto* block = std::get_if<Block>(&record)) blocks.push_back(*block);
     if (const auto* timing = std::get_if<DwellTiming>(&record)) timings.push_back(*timing);
     if (const auto* event = std::get_if<Event>(&record)) events.push_back(*event);
   }
-  void put_sample(const TickSamples& tick) noexcept override { samples.push_back(tick); }
+  void put_sample(const TickSamples& tick) noexcept override {
+    const OutsideTheLoop noting_down;
+    samples.push_back(tick);
+  }
   bool flush() noexcept override { return true; }
 
   std::vector<Point> points;
