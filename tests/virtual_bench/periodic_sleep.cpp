@@ -1,10 +1,9 @@
 // Sleeps to absolute deadlines 1 ms apart and prints when it woke up, to the nanosecond.
-#include <ctime>
-
 #include <cinttypes>
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 
 namespace {
 
