@@ -70,8 +70,11 @@ bool Pattern::matches(const Frame& frame) const noexcept {
 void Pattern::require(const Signal& signal, std::uint64_t raw) noexcept {
   insert_raw(mask, signal, ~std::uint64_t{0});
   insert_raw(value, signal, raw);
-  for (std::size_t n = minimum_length; n < max_fd_bytes; ++n)
-    if (mask[n] != 0) minimum_length = static_cast<std::uint8_t>(n + 1U);
+  cover(signal);
+}
+
+void Pattern::cover(const Signal& signal) noexcept {
+  while (minimum_length < max_fd_bytes && !fits(signal, minimum_length)) ++minimum_length;
 }
 
 void Pattern::require_byte(std::size_t position, std::uint8_t byte,

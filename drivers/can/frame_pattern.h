@@ -44,6 +44,9 @@ struct Pattern {
 
   // From now on the payload must have `raw` in the bits of `signal`.
   void require(const Signal& signal, std::uint64_t raw) noexcept;
+  // From now on the payload must be long enough for `signal`.
+  void cover(const Signal& signal) noexcept;
+
   void require_byte(std::size_t position, std::uint8_t byte,
                     std::uint8_t byte_mask = 0xFF) noexcept;
 };
