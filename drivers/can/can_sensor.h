@@ -15,6 +15,7 @@ struct FeedbackSettings {
   Signal signal;
   std::optional<std::uint64_t> invalid_raw;  // the code that means "no value"
   std::int64_t timeout_ns = 0;               // silence longer than this is a time-out; 0 = never
+  bool fd = false;                           // comes as a CAN-FD frame
   std::optional<Frame> poll;                 // asked at every read; the answer comes at a later one
 };
 
