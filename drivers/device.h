@@ -23,6 +23,13 @@ class Device {
   // outlives the device. The destructor leaves the actuator neutral.
   virtual void open(const Clock& clock) = 0;
 
+  // Right before the first command: switches the device on. Throws like open(). A rig that is only
+  // looked at is opened and never armed.
+  virtual void arm() {}
+
+  // Why the last command had a fault, for people; empty where there is nothing to say.
+  virtual std::string fault_reason() const { return {}; }
+
   // Valid after open(). Null where the device has no actuator.
   virtual Actuator* actuator() noexcept = 0;
   virtual Sensor& sensor(std::size_t index) noexcept = 0;

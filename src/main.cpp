@@ -1,7 +1,9 @@
 // The composition root: the only file that knows every driver.
 #include "cli/app.h"
+#include "drivers/can/can_driver.h"
 #include "sim/sim_driver.h"
 
 int main(int argc, char** argv) {
-  return sinerig::cli::run_app(argc, argv, {sinerig::sim::sim_driver()});
+  return sinerig::cli::run_app(argc, argv,
+                               {sinerig::sim::sim_driver(), sinerig::can::can_driver()});
 }

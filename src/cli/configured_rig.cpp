@@ -58,4 +58,16 @@ void ConfiguredRig::open() {
   }
 }
 
+void ConfiguredRig::arm() {
+  for (Part& part : parts_) part.device->arm();
+}
+
+std::string ConfiguredRig::fault_reason() const {
+  for (const Part& part : parts_) {
+    const std::string reason = part.device->fault_reason();
+    if (!reason.empty()) return reason;
+  }
+  return {};
+}
+
 }  // namespace sinerig::cli

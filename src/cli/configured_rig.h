@@ -22,6 +22,8 @@ class ConfiguredRig {
 
   // Acquires the hardware; the accessors below are valid from here on.
   void open();
+  void arm();
+  std::string fault_reason() const;
   Actuator& actuator() { return *actuator_; }
   const std::vector<Sensor*>& sensors() const { return sensors_; }
 

@@ -161,6 +161,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const StopOnSignal stop_on_signal{control};
   try {
     configured.open();
+    configured.arm();
   } catch (...) {
     writer.discard();
     throw;
@@ -170,8 +171,9 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   report::Progress progress{std::cout, isatty(STDOUT_FILENO) != 0, plan};
   const RunOutcome outcome = play(runner, control, outbox, writer, progress);
 
-  const std::string reason =
-      outcome.trip.tripped() ? describe(outcome.trip, rig.sensor_names()) : "";
+  std::string reason = outcome.trip.tripped() ? describe(outcome.trip, rig.sensor_names()) : "";
+  if (outcome.trip.cause == TripCause::actuator_fault && !configured.fault_reason().empty())
+    reason += ": " + configured.fault_reason();
   writer.set("outcome", outcome_name(outcome));
   writer.set("outcome_detail", reason);
   writer.set("dropped_samples", std::to_string(outbox.dropped_samples()));

@@ -103,7 +103,9 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
   stream << text("run      %s on %s, sinerig %s\n", run.fact("started_utc").c_str(),
                  run.fact("host").c_str(), run.fact("sinerig").c_str());
   const std::string outcome = run.fact("outcome");
-  stream << "outcome  " << (outcome.empty() ? "not finished" : outcome) << '\n';
+  const std::string detail = run.fact("outcome_detail");
+  stream << "outcome  " << (outcome.empty() ? "not finished" : outcome)
+         << (detail.empty() ? "" : ": " + detail) << '\n';
   std::uint64_t ticks = 0;
   std::uint64_t skipped = 0;
   std::int64_t max_lateness_ns = 0;

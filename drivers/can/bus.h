@@ -1,0 +1,81 @@
+// One CAN interface shared by the actuator, the sensors and the health watches of a rig: drains the
+// socket, keeps the newest frame of everything listened for, knows whether the bus is alive.
+//
+// listen() and start() come before the loop and may throw; the rest belongs to the loop's thread.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "drivers/can/frame_pattern.h"
+#include "drivers/can/socket.h"
+#include "sweep/nonblocking.h"
+
+namespace sinerig::can {
+
+enum class BusState : std::uint8_t { up, bus_off, link_down, gone };
+
+const char* to_string(BusState state) noexcept;
+
+struct BusCounters {
+  std::uint64_t sent = 0;
+  std::uint64_t dropped_full = 0;  // the transmit queue was full
+  std::uint64_t dropped_dead = 0;  // bus-off, link down or gone: not even tried
+  std::uint64_t received = 0;      // frames that something listens for
+  std::uint64_t bad_checksums = 0;
+  std::uint64_t error_frames = 0;
+  std::uint64_t bus_offs = 0;
+  std::uint64_t overflows = 0;  // frames that the kernel dropped because nobody read them in time
+};
+
+// The newest frame of one kind.
+struct Slot {
+  Pattern pattern;
+  Checksum checksum;
+  Frame frame;
+  std::int64_t time_ns = 0;   // when it arrived, CLOCK_MONOTONIC
+  std::uint64_t count = 0;    // frames so far: 0 = none yet
+  std::uint64_t spoiled = 0;  // frames with a wrong checksum
+};
+
+class Bus {
+ public:
+  Bus(const std::string& interface, bool fd_frames) : socket_(interface, fd_frames) {}
+
+  // The index of the slot that will hold the newest frame of this kind.
+  std::size_t listen(const Pattern& pattern, const Checksum& checksum = {});
+
+  // Tells the kernel which frames are wanted. Again after later listen()s.
+  void start();
+
+  // Takes in everything that has arrived, at most `max_frames_per_poll` frames.
+  void poll() noexcept SINERIG_NONBLOCKING;
+
+  // Sends at once or never. On a dead bus nothing is tried: frames left in its queue would all go
+  // out, late, when it comes back.
+  SendResult send(const Frame& frame) noexcept SINERIG_NONBLOCKING;
+
+  // poll() after waiting for something to arrive. Not for the loop.
+  void wait_and_poll(std::int64_t timeout_ns) noexcept;
+
+  const Slot& slot(std::size_t index) const noexcept { return slots_[index]; }
+  BusState state() const noexcept { return state_; }
+  const BusCounters& counters() const noexcept { return counters_; }
+  const std::string& interface() const noexcept { return socket_.interface(); }
+
+ private:
+  static constexpr int max_frames_per_poll = 512;
+  static constexpr std::int64_t rebind_period_ns = 100'000'000;
+
+  void dispatch(const Received& received) noexcept;
+  void note_error(std::uint32_t error_class) noexcept;
+  void try_to_rebind() noexcept;
+
+  Socket socket_;
+  std::vector<Slot> slots_;
+  BusState state_ = BusState::up;
+  BusCounters counters_;
+  std::int64_t next_rebind_ns_ = 0;
+};
+
+}  // namespace sinerig::can

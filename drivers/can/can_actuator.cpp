@@ -1,0 +1,97 @@
+#include "drivers/can/can_actuator.h"
+
+#include <cmath>
+
+namespace sinerig::can {
+
+CanActuator::CanActuator(Bus& bus, CommandSettings settings)
+    : bus_(bus),
+      settings_(std::move(settings)),
+      health_(bus, settings_.health),
+      next_keep_alive_ns_(settings_.keep_alive.size(), 0),
+      frame_(settings_.frame) {
+  check(frame_);
+  check(settings_.signal, frame_.length);
+  check(settings_.checksum, frame_.length);
+  for (Sequence* list :
+       {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown})
+    listen_for(bus_, *list);
+  held_.value = settings_.neutral;
+}
+
+CanActuator::~CanActuator() {
+  release();
+  if (started_) run_all(bus_, settings_.shutdown);
+}
+
+void CanActuator::start() {
+  started_ = true;
+  run(bus_, settings_.startup, "start-up");
+}
+
+// Neutral goes out before the drive is armed: one that finds a stale set-point would jump.
+void CanActuator::arm() {
+  released_ = false;
+  try {
+    compose(settings_.neutral);
+    send_surely(bus_, frame_);
+    run(bus_, settings_.arm, "arm");
+  } catch (...) {
+    release();
+    throw;
+  }
+  health_.begin();
+}
+
+Sample CanActuator::write(double command) noexcept {
+  bus_.poll();
+  released_ = false;
+  // A command that is no number must not leave the last one standing: neutral goes out instead.
+  compose(std::isfinite(command) ? command : settings_.neutral);
+  last_result_ = bus_.send(frame_);
+  const std::int64_t now_ns = monotonic_ns();
+  if (last_result_ == SendResult::sent) {
+    held_.value = encoded_;
+    held_.time_ns = now_ns;
+  }
+  keep_alive(now_ns);
+  violated_ = health_.violated(now_ns);
+  Sample answer = held_;
+  answer.fault = Fault::none;
+  if (!std::isfinite(command)) answer.fault = Fault::range;
+  if (last_result_ != SendResult::sent || violated_ != nullptr) answer.fault = Fault::bus;
+  return answer;
+}
+
+void CanActuator::compose(double command) noexcept {
+  encoded_ = encode(frame_.payload(), settings_.signal, command);
+  seal(frame_, settings_.checksum);
+}
+
+void CanActuator::keep_alive(std::int64_t now_ns) noexcept {
+  for (std::size_t n = 0; n < settings_.keep_alive.size(); ++n) {
+    if (now_ns < next_keep_alive_ns_[n]) continue;
+    next_keep_alive_ns_[n] = now_ns + settings_.keep_alive[n].period_ns;
+    bus_.send(settings_.keep_alive[n].frame);
+  }
+}
+
+void CanActuator::release() noexcept {
+  if (released_) return;
+  released_ = true;
+  compose(settings_.neutral);
+  if (send_surely(bus_, frame_) == SendResult::sent) held_.value = encoded_;
+  run_all(bus_, settings_.disarm);
+}
+
+std::string CanActuator::reason() const {
+  if (violated_ != nullptr) return health_.describe(*violated_);
+  switch (last_result_) {
+    case SendResult::sent: return "";
+    case SendResult::queue_full:
+      return bus_.interface() + ": the transmit queue is full, the command was dropped";
+    default: return bus_.interface() + ": " + to_string(bus_.state());
+  }
+}
+
+}  // namespace sinerig::can

@@ -1,0 +1,71 @@
+// A device on a CAN bus as the actuator of the loop.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "drivers/can/health.h"
+#include "drivers/can/sequence.h"
+#include "drivers/driver.h"
+
+namespace sinerig::can {
+
+struct KeepAlive {
+  Frame frame;
+  std::int64_t period_ns = 100'000'000;
+};
+
+struct CommandSettings {
+  Frame frame;  // constant bytes and signals are in it already
+  Signal signal;
+  Checksum checksum;
+  double neutral = 0.0;
+  Sequence startup;   // when the rig is opened: nothing may move
+  Sequence arm;       // before the first command
+  Sequence disarm;    // at every release
+  Sequence shutdown;  // when the rig is closed
+  std::vector<KeepAlive> keep_alive;
+  std::vector<HealthRule> health;
+};
+
+class CanActuator final : public Actuator {
+ public:
+  // Before Bus::start(). Throws std::invalid_argument for a frame or signal that cannot be.
+  // `bus` must outlive the actuator.
+  CanActuator(Bus& bus, CommandSettings settings);
+  ~CanActuator() override;  // releases, then runs the shut-down list
+
+  // After Bus::start(), before the loop. Both throw std::runtime_error where the device does not
+  // answer as it must; what was armed is disarmed again.
+  void start();
+  void arm();
+
+  // Sends the set-point once, never again. Fault::bus: it was dropped (queue full, bus-off, link
+  // down) or the device's health is not what it must be; the value is then what it last took.
+  Sample write(double command) noexcept SINERIG_NONBLOCKING override;
+
+  // Neutral command, then the disarm list. What cannot be sent is tried for 20 ms per frame.
+  void release() noexcept override;
+
+  // Why the last write() had a fault, for people; empty when it had none. Not for the loop.
+  std::string reason() const;
+
+ private:
+  void compose(double command) noexcept SINERIG_NONBLOCKING;
+  void keep_alive(std::int64_t now_ns) noexcept SINERIG_NONBLOCKING;
+
+  Bus& bus_;
+  CommandSettings settings_;
+  Health health_;
+  std::vector<std::int64_t> next_keep_alive_ns_;
+  Frame frame_;
+  double encoded_ = 0.0;  // what the bits in frame_ mean
+  Sample held_;
+  const HealthRule* violated_ = nullptr;
+  SendResult last_result_ = SendResult::sent;
+  bool started_ = false;
+  bool released_ = true;
+};
+
+}  // namespace sinerig::can

@@ -1,0 +1,370 @@
+#include "drivers/can/can_config.h"
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+namespace sinerig::can {
+namespace {
+
+using config::any_number;
+using config::Range;
+using config::zero_or_more;
+
+constexpr Range a_byte{.min = 0.0, .max = 255.0};
+constexpr Range an_id{.min = 0.0, .max = max_extended_id};
+constexpr Range a_payload_position{.min = 0.0, .max = max_fd_bytes - 1};
+
+std::int64_t nanoseconds(double seconds) {
+  return std::llround(seconds * 1e9);
+}
+
+// What the codec refuses, at the key it is about.
+template <class Action>
+decltype(auto) at_key(const Keys& keys, std::string_view key, Action action) {
+  try {
+    return action();
+  } catch (const config::ConfigError&) {
+    throw;
+  } catch (const std::exception& refused) {
+    keys.refuse(key, refused.what());
+  }
+}
+
+std::uint64_t raw_of(const Signal& signal, double value) {
+  Frame scratch;
+  scratch.length = max_fd_bytes;
+  encode(scratch.payload(), signal, value);
+  return extract_raw(scratch.payload(), signal);
+}
+
+}  // namespace
+
+const Dbc& ConfigReader::dbc(const Keys& keys) {
+  const Keys& holder = holder_of("dbc", keys);
+  if (!holder.has("dbc"))
+    keys.refuse("signal", "is a name in a DBC file; give the file with dbc = \"…\"");
+  const std::filesystem::path named = holder.at("dbc").text("dbc");
+  const std::string path = (std::filesystem::path(holder.folder_of("dbc")) / named).string();
+  const auto known = dbcs_.find(path);
+  if (known != dbcs_.end()) return known->second;
+  return at_key(holder, "dbc", [&]() -> const Dbc& {
+    return dbcs_.emplace(path, Dbc::read_file(path)).first->second;
+  });
+}
+
+std::uint32_t ConfigReader::shifted(const Keys& keys, std::string_view key, std::uint32_t id,
+                                    bool extended, std::string_view step_key) const {
+  const std::string_view given = keys.has(step_key) ? step_key : "node_step";
+  const auto step = static_cast<std::uint64_t>(holder_of(given, keys).integer(given, an_id, 0));
+  const std::uint64_t moved = id + step * node_;
+  const std::uint32_t highest = extended ? max_extended_id : max_standard_id;
+  if (moved > highest)
+    keys.refuse(key, "identifier " + std::to_string(moved) +
+                         " (with node_step · node added) is above " + id_text(highest, extended) +
+                         (extended ? "" : "; extended = true makes it a 29-bit one"));
+  return static_cast<std::uint32_t>(moved);
+}
+
+Frame ConfigReader::frame_of_message(const Keys& keys, const DbcMessage& message) const {
+  Frame frame;
+  frame.extended = message.extended;
+  frame.id = shifted(keys, "signal", message.id, message.extended);
+  frame.length = message.length;
+  frame.fd = keys.at("fd").flag("fd", message.length > max_classic_bytes);
+  frame.bit_rate_switch = frame.fd && keys.at("bit_rate_switch").flag("bit_rate_switch", false);
+  return frame;
+}
+
+// A frame given in place: id, bytes or length, flags.
+Frame ConfigReader::frame(const Keys& keys) {
+  Frame frame;
+  frame.extended = keys.at("extended").flag("extended", false);
+  frame.id =
+      shifted(keys, "id", static_cast<std::uint32_t>(keys.integer("id", an_id)), frame.extended);
+  frame.fd = keys.at("fd").flag("fd", false);
+  frame.bit_rate_switch = frame.fd && keys.at("bit_rate_switch").flag("bit_rate_switch", false);
+  frame.remote = keys.at("remote").flag("remote", false);
+  std::vector<double> bytes;
+  if (keys.has("bytes")) bytes = keys.at("bytes").numbers("bytes", a_byte);
+  const double longest = frame.fd ? max_fd_bytes : max_classic_bytes;
+  if (static_cast<double>(bytes.size()) > longest)
+    keys.refuse("bytes", "a classic frame has up to 8 bytes; CAN-FD (fd = true) up to 64");
+  frame.length = static_cast<std::uint8_t>(keys.integer("length", {.min = 0.0, .max = longest},
+                                                        static_cast<std::int64_t>(bytes.size())));
+  if (frame.length < bytes.size()) keys.refuse("length", "is shorter than bytes");
+  std::ranges::transform(bytes, frame.data.begin(),
+                         [](double byte) { return static_cast<std::uint8_t>(byte); });
+  at_key(keys, "id", [&] { check(frame); });
+  return frame;
+}
+
+Signal ConfigReader::layout(const Keys& keys) const {
+  Signal signal;
+  const std::string type = keys.at("type").choice("type", {"uint", "int", "float32", "float64"});
+  if (type == "int") signal.encoding = Encoding::signed_integer;
+  if (type == "float32") signal.encoding = Encoding::float32;
+  if (type == "float64") signal.encoding = Encoding::float64;
+  if (keys.at("order").choice("order", {"intel", "motorola"}) == "motorola")
+    signal.order = ByteOrder::motorola;
+  signal.start_bit =
+      static_cast<std::uint16_t>(keys.integer("start_bit", {.min = 0.0, .max = 511.0}));
+  const std::int64_t usual_bits = type == "float64" ? 64 : type == "float32" ? 32 : 16;
+  signal.length =
+      static_cast<std::uint8_t>(keys.integer("bits", {.min = 1.0, .max = 64.0}, usual_bits));
+  if (!keys.has("range")) {
+    signal.scale = keys.number("scale", any_number, 1.0);
+    signal.offset = keys.number("offset", any_number, 0.0);
+    return signal;
+  }
+  const std::vector<double> ends = keys.at("range").numbers("range", any_number);
+  if (ends.size() != 2 || !(ends[0] < ends[1]) || type != "uint")
+    keys.refuse("range", "must be [value of code 0, value of the highest code] of a \"uint\"");
+  signal.scale = (ends[1] - ends[0]) / (std::ldexp(1.0, signal.length) - 1.0);
+  signal.offset = ends[0];
+  return signal;
+}
+
+// `unit_scale` turns the device's unit into the rig's; clamp and wrap are in the rig's.
+void ConfigReader::convert_unit(const Keys& keys, Signal& signal) const {
+  const double factor = keys.number("unit_scale", any_number, 1.0);
+  if (factor == 0.0) keys.refuse("unit_scale", "must not be 0");
+  signal.scale *= factor;
+  signal.offset *= factor;
+  signal.minimum *= factor;
+  signal.maximum *= factor;
+  if (factor < 0.0) std::swap(signal.minimum, signal.maximum);
+  signal.minimum = keys.number("clamp_min", any_number, signal.minimum);
+  signal.maximum = keys.number("clamp_max", any_number, signal.maximum);
+  signal.wrap_modulus = keys.number("wrap", zero_or_more, 0.0);
+}
+
+ConfigReader::Place ConfigReader::place_by_name(const Keys& keys) {
+  const Dbc& database = dbc(keys);
+  const std::string name = keys.at("signal").text("signal");
+  const DbcBinding binding = at_key(keys, "signal", [&] { return database.find(name); });
+  Place place;
+  place.frame = frame_of_message(keys, *binding.message);
+  place.signal = binding.signal->signal;
+  for (const auto& [multiplexor, raw] : binding.multiplexors) {
+    place.pattern.require(multiplexor->signal, raw);
+    insert_raw(place.frame.payload(), multiplexor->signal, raw);
+  }
+  return place;
+}
+
+ConfigReader::Place ConfigReader::place_by_layout(const Keys& keys) {
+  Place place;
+  place.signal = layout(keys);
+  place.frame = frame(keys);
+  return place;
+}
+
+ConfigReader::Place ConfigReader::place(const Keys& keys) {
+  Place place = keys.has("signal") ? place_by_name(keys) : place_by_layout(keys);
+  convert_unit(keys, place.signal);
+  place.pattern.id = place.frame.id;
+  place.pattern.extended = place.frame.extended;
+  return place;
+}
+
+// Constant signals of a frame: set = [{ signal = "…" or start_bit, bits, …, value }, …].
+void ConfigReader::fill(const Keys& keys, Frame& frame, bool by_name) {
+  for (const Keys& entry : keys.tables("set")) {
+    Signal signal;
+    if (by_name) {
+      const std::string name = entry.at("signal").text("signal");
+      const DbcBinding binding = at_key(entry, "signal", [&] { return dbc(keys).find(name); });
+      if (shifted(keys, "set", binding.message->id, binding.message->extended) != frame.id)
+        entry.refuse("signal", "is in another message than the signals before it");
+      signal = binding.signal->signal;
+      for (const auto& [multiplexor, raw] : binding.multiplexors)
+        insert_raw(frame.payload(), multiplexor->signal, raw);
+    } else {
+      signal = layout(entry);
+      at_key(entry, "start_bit", [&] { check(signal, frame.length); });
+    }
+    encode(frame.payload(), signal, entry.at("value").number("value", any_number));
+  }
+}
+
+Checksum ConfigReader::checksum(const Keys& keys, std::size_t bytes) const {
+  Checksum checksum;
+  const std::string kind = keys.at("checksum").choice("checksum", {"none", "sum8", "xor8", "crc8"});
+  if (kind == "none") return checksum;
+  checksum.kind = kind == "sum8"   ? Checksum::Kind::sum8
+                  : kind == "xor8" ? Checksum::Kind::xor8
+                                   : Checksum::Kind::crc8;
+  const auto byte = [&](std::string_view key, Range range, std::size_t fallback) {
+    return static_cast<std::uint8_t>(keys.integer(key, range, static_cast<std::int64_t>(fallback)));
+  };
+  const std::size_t last = bytes > 0 ? bytes - 1 : 0;
+  checksum.position = byte("checksum_byte", a_payload_position, last);
+  checksum.first = byte("checksum_first", a_payload_position, 0);
+  checksum.last = byte("checksum_last", a_payload_position, last);
+  checksum.with_id = keys.at("checksum_with_id").flag("checksum_with_id", false);
+  checksum.polynomial = byte("checksum_polynomial", a_byte, checksum.polynomial);
+  checksum.initial = byte("checksum_initial", a_byte, checksum.initial);
+  at_key(keys, "checksum", [&] { check(checksum, bytes); });
+  return checksum;
+}
+
+// [[position, value], [position, value, mask]]
+void ConfigReader::require_bytes(const Keys& keys, std::string_view key, Pattern& pattern) const {
+  if (!keys.has(key)) return;
+  for (const std::vector<double>& row : keys.at(key).rows(key, a_byte)) {
+    if (row.size() < 2 || row.size() > 3 || row[0] >= static_cast<double>(max_fd_bytes))
+      keys.refuse(key, "every row is [position, value] or [position, value, mask]");
+    const double mask = row.size() == 3 ? row[2] : 255.0;
+    pattern.require_byte(static_cast<std::size_t>(row[0]), static_cast<std::uint8_t>(row[1]),
+                         static_cast<std::uint8_t>(mask));
+  }
+}
+
+Pattern ConfigReader::expected(const Keys& keys) {
+  Pattern pattern;
+  if (keys.has("expect_id")) {
+    pattern.extended = keys.at("expect_extended").flag("expect_extended", false);
+    const auto id = static_cast<std::uint32_t>(keys.integer("expect_id", an_id));
+    pattern.id = shifted(keys, "expect_id", id, pattern.extended, "expect_node_step");
+    require_bytes(keys, "expect_bytes", pattern);
+    return pattern;
+  }
+  for (const Keys& entry : keys.tables("expect")) {
+    const Place found = place_by_name(entry);
+    pattern.id = found.frame.id;
+    pattern.extended = found.frame.extended;
+    pattern.require(found.signal,
+                    raw_of(found.signal, entry.at("value").number("value", any_number)));
+  }
+  return pattern;
+}
+
+Step ConfigReader::step(const Keys& keys) {
+  Step step;
+  step.name = keys.at("name").text("name");
+  if (keys.has("id")) {
+    step.frame = frame(keys);
+    fill(keys, *step.frame, false);
+  } else if (keys.has("message")) {
+    const std::string name = keys.at("message").text("message");
+    step.frame = at_key(keys, "message",
+                        [&] { return frame_of_message(keys, dbc(keys).find_message(name)); });
+  } else if (const std::vector<Keys> entries = keys.tables("set"); !entries.empty()) {
+    step.frame = place_by_name(entries.front()).frame;
+    fill(keys, *step.frame, true);
+  }
+  if (step.frame) {
+    const Checksum seal_rule = checksum(keys, step.frame->length);
+    seal(*step.frame, seal_rule);
+    at_key(keys, "name", [&] { check(*step.frame); });
+  }
+  step.delay_ns = nanoseconds(keys.number("delay_s", {.min = 0.0, .max = 60.0}, 0.0));
+  step.repeats =
+      static_cast<std::uint32_t>(keys.integer("repeats", {.min = 1.0, .max = 1000.0}, 1));
+  if (keys.has("expect_id") || keys.has("expect")) {
+    Expectation expectation;
+    expectation.pattern = expected(keys);
+    if (keys.has("refuse_bytes")) {
+      expectation.refusal = Pattern{};
+      expectation.refusal->id = expectation.pattern.id;
+      expectation.refusal->extended = expectation.pattern.extended;
+      require_bytes(keys, "refuse_bytes", *expectation.refusal);
+    }
+    expectation.timeout_ns =
+        nanoseconds(keys.number("timeout_s", {.min = 0.0, .max = 60.0, .open_min = true}, 0.5));
+    step.expect = expectation;
+  }
+  return step;
+}
+
+// The device's part of a list comes first, the channel's after it.
+Sequence ConfigReader::sequence(const Keys& keys, std::string_view list) {
+  Sequence sequence;
+  if (device_)
+    for (const Keys& entry : device_->tables(list)) sequence.push_back(step(entry));
+  for (const Keys& entry : keys.tables(list)) sequence.push_back(step(entry));
+  return sequence;
+}
+
+HealthRule ConfigReader::health(const Keys& keys) {
+  HealthRule rule;
+  rule.name = keys.at("name").text("name");
+  const Place found = place(keys);
+  rule.pattern = found.pattern;
+  require_bytes(keys, "match_bytes", rule.pattern);
+  rule.signal = found.signal;
+  using Operator = HealthRule::Operator;
+  const std::pair<const char*, Operator> operators[] = {{"equals", Operator::equal},
+                                                        {"not", Operator::not_equal},
+                                                        {"at_most", Operator::at_most},
+                                                        {"at_least", Operator::at_least}};
+  int given = 0;
+  for (const auto& [key, comparison] : operators) {
+    if (!keys.has(key)) continue;
+    ++given;
+    rule.comparison = comparison;
+    rule.value = keys.at(key).number(key, any_number);
+  }
+  if (given != 1) keys.refuse("name", "needs exactly one of equals, not, at_most, at_least");
+  rule.max_age_ns = nanoseconds(keys.number("max_age_s", zero_or_more, 0.0));
+  return rule;
+}
+
+void ConfigReader::watch(const Keys& keys, CommandSettings& settings) {
+  for (const Keys& entry : keys.tables("keep_alive")) {
+    const Step sent = step(entry);
+    if (!sent.frame) entry.refuse("name", "needs a frame: id, message or set");
+    const double period_s = entry.at("period_s").number("period_s", zero_or_more);
+    settings.keep_alive.push_back({*sent.frame, nanoseconds(period_s)});
+  }
+  for (const Keys& entry : keys.tables("health")) settings.health.push_back(health(entry));
+}
+
+CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
+  const bool by_name = keys.has("signal");
+  const std::string_view where = by_name ? "signal" : "start_bit";
+  Place found = place(keys);
+  CommandSettings settings;
+  settings.frame = found.frame;
+  fill(keys, settings.frame, by_name);
+  settings.signal = found.signal;
+  at_key(keys, where, [&] {
+    check(settings.frame);
+    check(settings.signal, settings.frame.length);
+  });
+  settings.checksum = checksum(keys, settings.frame.length);
+  settings.neutral = neutral;
+  settings.startup = sequence(keys, "startup");
+  settings.arm = sequence(keys, "arm");
+  settings.disarm = sequence(keys, "disarm");
+  settings.shutdown = sequence(keys, "shutdown");
+  if (device_) watch(*device_, settings);
+  watch(keys, settings);
+  return settings;
+}
+
+FeedbackSettings ConfigReader::feedback(const Keys& keys) {
+  const Place found = place(keys);
+  FeedbackSettings settings;
+  settings.signal = found.signal;
+  settings.pattern = found.pattern;
+  settings.pattern.id_mask =
+      static_cast<std::uint32_t>(keys.integer("id_mask", an_id, max_extended_id));
+  require_bytes(keys, "match_bytes", settings.pattern);
+  settings.pattern.cover(settings.signal);
+  at_key(keys, keys.has("signal") ? "signal" : "start_bit",
+         [&] { check(settings.signal, settings.pattern.minimum_length); });
+  settings.checksum = checksum(keys, std::max(found.frame.length, settings.pattern.minimum_length));
+  settings.fd = found.frame.fd;
+  if (keys.has("invalid"))
+    settings.invalid_raw = static_cast<std::uint64_t>(
+        keys.integer("invalid", {.min = 0.0, .max = 9007199254740992.0}));
+  settings.timeout_ns = nanoseconds(keys.number("timeout_s", zero_or_more, 0.0));
+  for (const Keys& entry : keys.tables("poll")) settings.poll = step(entry).frame;
+  return settings;
+}
+
+}  // namespace sinerig::can

@@ -1,0 +1,64 @@
+// From keys to frames: reads commands, feedback, frame lists and health rules of a rig file or a
+// device profile. Signals are described in place or named after a DBC file.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+
+#include "drivers/can/can_actuator.h"
+#include "drivers/can/can_keys.h"
+#include "drivers/can/can_sensor.h"
+#include "drivers/can/dbc.h"
+
+namespace sinerig::can {
+
+class ConfigReader {
+ public:
+  // `device` has what all channels of a profile share: dbc, node_step, lists; none without a
+  // profile. `node` is the address of the device.
+  ConfigReader(std::optional<Keys> device, std::uint32_t node)
+      : device_{std::move(device)}, node_{node} {}
+
+  // All throw config::ConfigError at the key that is wrong.
+  CommandSettings command(const Keys& keys, double neutral);
+  FeedbackSettings feedback(const Keys& keys);
+
+ private:
+  // A signal, the frame it is in, and what selects it there.
+  struct Place {
+    Frame frame;
+    Pattern pattern;
+    Signal signal;
+  };
+
+  Place place(const Keys& keys);
+  Place place_by_name(const Keys& keys);
+  Place place_by_layout(const Keys& keys);
+  Signal layout(const Keys& keys) const;
+  void convert_unit(const Keys& keys, Signal& signal) const;
+  Frame frame(const Keys& keys);
+  Frame frame_of_message(const Keys& keys, const DbcMessage& message) const;
+  void fill(const Keys& keys, Frame& frame, bool by_name);
+  Checksum checksum(const Keys& keys, std::size_t bytes) const;
+  void require_bytes(const Keys& keys, std::string_view key, Pattern& pattern) const;
+  Pattern expected(const Keys& keys);
+  Step step(const Keys& keys);
+  Sequence sequence(const Keys& keys, std::string_view list);
+  HealthRule health(const Keys& keys);
+  void watch(const Keys& keys, CommandSettings& settings);
+  const Dbc& dbc(const Keys& keys);
+  std::uint32_t shifted(const Keys& keys, std::string_view key, std::uint32_t id, bool extended,
+                        std::string_view step_key = "node_step") const;
+
+  // Who has `key`: the channel if it does, else the device it belongs to.
+  const Keys& holder_of(std::string_view key, const Keys& keys) const {
+    return keys.has(key) || !device_ ? keys : *device_;
+  }
+
+  std::optional<Keys> device_;
+  std::uint32_t node_;
+  std::map<std::string, Dbc> dbcs_;
+};
+
+}  // namespace sinerig::can

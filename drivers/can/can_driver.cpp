@@ -1,0 +1,178 @@
+#include "drivers/can/can_driver.h"
+
+#include <algorithm>
+#include <filesystem>
+#include <optional>
+#include <utility>
+
+#include "drivers/can/can_config.h"
+
+namespace sinerig::can {
+namespace {
+
+using config::RigFile;
+using config::Section;
+
+// A profile and the file it was read from, which the sections point into.
+struct Profile {
+  std::unique_ptr<RigFile> file;
+  std::string folder;
+
+  // [command.torque]: the kind is "command" or "feedback".
+  std::optional<Section> find(const std::string& kind, const std::string& name) const {
+    for (const Section& section : file->children(kind))
+      if (section.name() == kind + "." + name) return section;
+    return std::nullopt;
+  }
+  std::string names(const std::string& kind) const {
+    std::string names;
+    for (const Section& section : file->children(kind))
+      names += " \"" + section.name().substr(kind.size() + 1) + "\"";
+    return names;
+  }
+};
+
+std::string folder_of(const std::string& path) {
+  return std::filesystem::path(path).parent_path().string();
+}
+
+class CanDevice final : public Device {
+ public:
+  explicit CanDevice(const DeviceRequest& request)
+      : rig_folder_{folder_of(request.rig.file->name())} {
+    if (request.actuator != nullptr) {
+      const Section& section = request.actuator->section;
+      command_ =
+          read<CommandSettings>(section, "command", [&](ConfigReader& reader, const Keys& keys) {
+            return reader.command(keys, request.rig.guard.neutral);
+          });
+      command_interface_ = interface_of(section, needs_fd(*command_));
+    }
+    for (const config::Channel* sensor : request.sensors) {
+      Feedback feedback;
+      feedback.settings = read<FeedbackSettings>(
+          sensor->section, "feedback",
+          [](ConfigReader& reader, const Keys& keys) { return reader.feedback(keys); });
+      const bool polls_fd = feedback.settings.poll && feedback.settings.poll->fd;
+      feedback.interface = interface_of(sensor->section, feedback.settings.fd || polls_fd);
+      feedback_.push_back(std::move(feedback));
+    }
+  }
+
+  void open(const Clock& /*clock*/) override {
+    for (const Interface& interface : interfaces_)
+      buses_.push_back(std::make_unique<Bus>(interface.name, interface.fd));
+    if (command_) actuator_.emplace(*buses_[command_interface_], *command_);
+    for (const Feedback& feedback : feedback_)
+      sensors_.push_back(
+          std::make_unique<CanSensor>(*buses_[feedback.interface], feedback.settings));
+    for (const auto& bus : buses_) bus->start();
+    if (actuator_) actuator_->start();
+  }
+
+  void arm() override {
+    if (actuator_) actuator_->arm();
+  }
+
+  Actuator* actuator() noexcept override { return actuator_ ? &*actuator_ : nullptr; }
+  Sensor& sensor(std::size_t index) noexcept override { return *sensors_[index]; }
+
+  std::string fault_reason() const override { return actuator_ ? actuator_->reason() : ""; }
+
+ private:
+  struct Interface {
+    std::string name;
+    bool fd = false;
+  };
+  struct Feedback {
+    FeedbackSettings settings;
+    std::size_t interface = 0;
+  };
+
+  static bool needs_fd(const CommandSettings& settings) {
+    const auto has_fd = [](const Sequence& list) {
+      return std::ranges::any_of(list,
+                                 [](const Step& step) { return step.frame && step.frame->fd; });
+    };
+    return settings.frame.fd || has_fd(settings.startup) || has_fd(settings.arm) ||
+           has_fd(settings.disarm) || has_fd(settings.shutdown);
+  }
+
+  std::size_t interface_of(const Section& section, bool fd) {
+    const std::string name = section.text("interface");
+    for (std::size_t n = 0; n < interfaces_.size(); ++n) {
+      if (interfaces_[n].name != name) continue;
+      interfaces_[n].fd = interfaces_[n].fd || fd;
+      return n;
+    }
+    interfaces_.push_back({name, fd});
+    return interfaces_.size() - 1;
+  }
+
+  // Reads one channel: from the rig file alone, or laid over [command.NAME] of its profile.
+  template <class Settings, class Read>
+  Settings read(const Section& section, const std::string& kind, Read read_settings) {
+    const auto node = static_cast<std::uint32_t>(
+        section.integer("node", {.min = 0.0, .max = max_extended_id}, 0));
+    if (!section.has("profile")) {
+      const Keys keys{section, rig_folder_};
+      ConfigReader reader{std::nullopt, node};
+      return read_settings(reader, keys);
+    }
+    const Profile& profile = profile_at(section);
+    const std::string name = section.text(kind);
+    const std::optional<Section> channel = profile.find(kind, name);
+    if (!channel)
+      section.refuse(kind, "the profile has no such " + kind + "; it has" + profile.names(kind));
+    ConfigReader reader{Keys{profile.file->section("device"), profile.folder}, node};
+    return read_settings(reader, Keys{section, rig_folder_, *channel, profile.folder});
+  }
+
+  // Profiles are checked as a whole, so that a mistake in a part not used yet is found today.
+  const Profile& profile_at(const Section& section) {
+    const std::string path =
+        (std::filesystem::path(rig_folder_) / section.text("profile")).lexically_normal().string();
+    const auto known = std::ranges::find_if(
+        profiles_, [&](const Profile& profile) { return profile.file->name() == path; });
+    if (known != profiles_.end()) return *known;
+    Profile profile{RigFile::load(path), folder_of(path)};
+    const Section device = profile.file->section("device");
+    device.text("name");
+    device.text("source");
+    ConfigReader reader{Keys{device, profile.folder}, 0};
+    for (const Section& command : profile.file->children("command")) {
+      command.text("unit");
+      reader.command(Keys{command, profile.folder}, 0.0);
+    }
+    for (const Section& feedback : profile.file->children("feedback")) {
+      feedback.text("unit");
+      reader.feedback(Keys{feedback, profile.folder});
+    }
+    profile.file->refuse_unread();
+    profiles_.push_back(std::move(profile));
+    return profiles_.back();
+  }
+
+  std::string rig_folder_;
+  std::vector<Profile> profiles_;
+  std::vector<Interface> interfaces_;
+  std::optional<CommandSettings> command_;
+  std::size_t command_interface_ = 0;
+  std::vector<Feedback> feedback_;
+
+  std::vector<std::unique_ptr<Bus>> buses_;  // outlive what is on them
+  std::vector<std::unique_ptr<CanSensor>> sensors_;
+  std::optional<CanActuator> actuator_;
+};
+
+}  // namespace
+
+DriverKit can_driver() {
+  return {.name = "can",
+          .summary = "CAN and CAN-FD devices on SocketCAN, by signal, DBC file or device profile",
+          .configure = [](const DeviceRequest& request) -> std::unique_ptr<Device> {
+            return std::make_unique<CanDevice>(request);
+          }};
+}
+
+}  // namespace sinerig::can

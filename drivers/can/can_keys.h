@@ -1,0 +1,60 @@
+// The keys of one CAN channel: those of the rig file laid over those of a device profile, each
+// remembering which file it is in, so that messages and relative paths are right.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "config/section.h"
+
+namespace sinerig::can {
+
+class Keys {
+ public:
+  Keys(config::Section section, std::string folder)
+      : base_{std::move(section)}, base_folder_{std::move(folder)} {}
+  Keys(config::Section over, std::string over_folder, config::Section base, std::string folder)
+      : over_{std::move(over)},
+        over_folder_{std::move(over_folder)},
+        base_{std::move(base)},
+        base_folder_{std::move(folder)} {}
+
+  bool has(std::string_view key) const { return (over_ && over_->has(key)) || base_.has(key); }
+
+  // The section that holds `key`: the rig's if it does, else the profile's.
+  const config::Section& at(std::string_view key) const {
+    return over_ && over_->has(key) ? *over_ : base_;
+  }
+  const std::string& folder_of(std::string_view key) const {
+    return over_ && over_->has(key) ? over_folder_ : base_folder_;
+  }
+
+  double number(std::string_view key, config::Range range, double fallback) const {
+    return at(key).number(key, range, fallback);
+  }
+  std::int64_t integer(std::string_view key, config::Range range) const {
+    return at(key).integer(key, range);
+  }
+  std::int64_t integer(std::string_view key, config::Range range, std::int64_t fallback) const {
+    return at(key).integer(key, range, fallback);
+  }
+  std::vector<Keys> tables(std::string_view key) const {
+    std::vector<Keys> tables;
+    for (const config::Section& table : at(key).tables(key))
+      tables.emplace_back(table, folder_of(key));
+    return tables;
+  }
+  [[noreturn]] void refuse(std::string_view key, std::string_view rule) const {
+    at(key).refuse(key, rule);
+  }
+
+ private:
+  std::optional<config::Section> over_;
+  std::string over_folder_;
+  config::Section base_;
+  std::string base_folder_;
+};
+
+}  // namespace sinerig::can

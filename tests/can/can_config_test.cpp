@@ -1,0 +1,238 @@
+#include "drivers/can/can_config.h"
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "drivers/can/can_driver.h"
+
+namespace sinerig::can {
+namespace {
+
+using config::ConfigError;
+using config::RigFile;
+using config::Section;
+using testing::HasSubstr;
+using Bytes = std::vector<std::uint8_t>;
+
+const std::string devices = std::string(SINERIG_SOURCE_DIR) + "/config/devices";
+
+Bytes bytes_of(const Frame& frame) {
+  return {frame.data.begin(), frame.data.begin() + frame.length};
+}
+
+// The parts of a shipped profile, as a rig file with this node would have them.
+struct Profile {
+  std::unique_ptr<RigFile> file;
+  std::uint32_t node;
+
+  Profile(const std::string& name, std::uint32_t node_)
+      : file(RigFile::load(devices + "/" + name)), node(node_) {}
+
+  Keys part(const std::string& kind, const std::string& name) const {
+    for (const Section& section : file->children(kind))
+      if (section.name() == kind + "." + name) return Keys{section, devices};
+    throw std::out_of_range(kind + "." + name);
+  }
+  ConfigReader reader() const { return {Keys{file->section("device"), devices}, node}; }
+  CommandSettings command(const std::string& name) const {
+    return reader().command(part("command", name), 0.0);
+  }
+  FeedbackSettings feedback(const std::string& name) const {
+    return reader().feedback(part("feedback", name));
+  }
+};
+
+Bytes set_point(const CommandSettings& settings, double value) {
+  Frame frame = settings.frame;
+  encode(frame.payload(), settings.signal, value);
+  seal(frame, settings.checksum);
+  return bytes_of(frame);
+}
+
+double value_of(const FeedbackSettings& settings, const Bytes& bytes) {
+  Frame frame;
+  frame.id = settings.pattern.id;
+  frame.extended = settings.pattern.extended;
+  frame.length = static_cast<std::uint8_t>(bytes.size());
+  std::copy(bytes.begin(), bytes.end(), frame.data.begin());
+  EXPECT_TRUE(settings.pattern.matches(frame));
+  return decode(frame.payload(), settings.signal);
+}
+
+// The example of documentation/comm_can.md: 51 A to VESC 23.
+TEST(CanProfile, VescSetsCurrentAsItsDocumentationShows) {
+  const Profile vesc("vesc.toml", 23);
+  const CommandSettings current = vesc.command("current");
+  EXPECT_EQ(current.frame.id, 0x117u);
+  EXPECT_TRUE(current.frame.extended);
+  EXPECT_EQ(set_point(current, 51.0), (Bytes{0x00, 0x00, 0xC7, 0x38}));
+  EXPECT_EQ(vesc.feedback("erpm").pattern.id, 0x917u);
+}
+
+TEST(CanProfile, ODriveTorqueIsAFloatOfTheNodesMessage) {
+  const Profile odrive("odrive.toml", 3);
+  const CommandSettings torque = odrive.command("torque");
+  EXPECT_EQ(torque.frame.id, 3u * 32u + 14u);
+  EXPECT_EQ(set_point(torque, -1.5), (Bytes{0, 0, 0xC0, 0xBF, 0, 0, 0, 0}));
+  ASSERT_EQ(torque.startup.size(), 2u);
+  EXPECT_EQ(torque.startup[0].frame->id, 3u * 32u + 24u);
+  EXPECT_EQ(torque.startup[0].frame->length, 0);
+  EXPECT_EQ(bytes_of(*torque.startup[1].frame), (Bytes{1, 0, 0, 0, 1, 0, 0, 0}));
+  ASSERT_EQ(torque.arm.size(), 1u);
+  EXPECT_EQ(bytes_of(*torque.arm[0].frame), (Bytes{8, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(torque.arm[0].expect->pattern.id, 3u * 32u + 1u);
+  EXPECT_EQ(torque.health.size(), 2u);
+  // A quarter turn.
+  EXPECT_DOUBLE_EQ(value_of(odrive.feedback("position"), {0, 0, 0x80, 0x3E, 0, 0, 0, 0}),
+                   1.5707963267948966);
+}
+
+TEST(CanProfile, MitFramesHoldNeutralConstantsAndTheNodesReply) {
+  const Profile mit("mit-dm4310.toml", 5);
+  const CommandSettings torque = mit.command("torque");
+  EXPECT_EQ(torque.frame.id, 5u);
+  EXPECT_EQ(set_point(torque, 10.0), (Bytes{0x80, 0x00, 0x80, 0x00, 0x00, 0x00, 0x0F, 0xFF}));
+  EXPECT_EQ(torque.arm.at(0).frame->id, 5u);
+  EXPECT_EQ(torque.arm.at(0).expect->pattern.id, 0u) << "answered to MST_ID";
+  EXPECT_NEAR(value_of(mit.feedback("position"), {0x15, 0xFF, 0xFF, 0, 0, 0, 0, 0}), 12.5, 1e-12);
+}
+
+// The torque of the example in docs/protocol/can.md is an int16; here the registers are floats.
+TEST(CanProfile, MoteusFramesAreWholeFdFrames) {
+  const Profile moteus("moteus.toml", 1);
+  const CommandSettings torque = moteus.command("torque");
+  EXPECT_EQ(torque.frame.id, 0x8001u);
+  EXPECT_TRUE(torque.frame.fd && torque.frame.bit_rate_switch);
+  const Bytes frame = set_point(torque, 1.0);
+  ASSERT_EQ(frame.size(), 32u);
+  EXPECT_EQ(Bytes(frame.begin(), frame.begin() + 9),
+            (Bytes{0x01, 0x00, 0x0A, 0x0F, 0x22, 0x00, 0x00, 0x80, 0x3F}));
+  EXPECT_EQ(moteus.feedback("velocity").pattern.id, 0x100u);
+  EXPECT_TRUE(moteus.feedback("velocity").fd);
+}
+
+TEST(CanProfile, RmdTorqueReplyIsToldApartByItsCommandByte) {
+  const Profile rmd("myactuator-rmd.toml", 1);
+  EXPECT_EQ(rmd.command("current").frame.id, 0x141u);
+  EXPECT_EQ(set_point(rmd.command("current"), -1.0), (Bytes{0xA1, 0, 0, 0, 0x9C, 0xFF, 0, 0}));
+  const FeedbackSettings angle = rmd.feedback("angle");
+  EXPECT_EQ(angle.pattern.id, 0x241u);
+  ASSERT_TRUE(angle.poll.has_value());
+  EXPECT_EQ(bytes_of(*angle.poll), (Bytes{0x92, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_NEAR(value_of(angle, {0x92, 0, 0, 0, 0xA0, 0x8C, 0, 0}), 6.283185307179586, 1e-12);
+}
+
+TEST(CanProfile, Gm6020IsBigEndianAndWraps) {
+  const Profile gm("dji-gm6020.toml", 2);
+  const CommandSettings current = gm.command("current");
+  EXPECT_EQ(current.frame.id, 0x1FEu);
+  EXPECT_EQ(set_point(current, 1.5), (Bytes{0x20, 0, 0, 0, 0, 0, 0, 0}));
+  const FeedbackSettings angle = gm.feedback("angle");
+  EXPECT_EQ(angle.pattern.id, 0x206u);
+  EXPECT_NEAR(value_of(angle, {0x10, 0, 0, 0, 0, 0, 0, 0}), 3.141592653589793, 1e-12);
+  EXPECT_NEAR(angle.signal.wrap_modulus, 6.283185307179586, 1e-12);
+}
+
+TEST(CanProfile, Cia402StartsByExpeditedSdoAndSyncsEveryTick) {
+  const Profile drive("cia402.toml", 4);
+  const CommandSettings torque = drive.command("torque");
+  EXPECT_EQ(torque.frame.id, 0x204u);
+  EXPECT_EQ(set_point(torque, 0.5), (Bytes{0x0F, 0x00, 0xF4, 0x01}));
+  const Step& mode = torque.startup.back();
+  EXPECT_EQ(mode.frame->id, 0x604u);
+  EXPECT_EQ(mode.expect->pattern.id, 0x584u);
+  EXPECT_TRUE(mode.expect->refusal.has_value());
+  EXPECT_EQ(torque.startup.front().frame->id, 0u) << "NMT has no node in its identifier";
+  ASSERT_EQ(torque.keep_alive.size(), 1u);
+  EXPECT_EQ(torque.keep_alive[0].frame.id, 0x080u);
+  EXPECT_EQ(torque.keep_alive[0].period_ns, 0);
+}
+
+TEST(CanProfile, EveryShippedProfileIsReadWholeByTheDriver) {
+  int profiles = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(devices)) {
+    if (entry.path().extension() != ".toml") continue;
+    const auto profile = RigFile::load(entry.path().string());
+    const std::string command = profile->children("command").front().name().substr(8);
+    const std::string feedback = profile->children("feedback").front().name().substr(9);
+    const std::string channel = "driver = \"can\"\ninterface = \"can0\"\nnode = 1\nprofile = \"" +
+                                entry.path().filename().string() + "\"\n";
+    auto file = RigFile::parse(
+        "[loop]\nrate_hz = 1000\n[sweep]\nstart_hz = 1\nstop_hz = 10\n"
+        "points = 3\namplitude = 0.1\n[limits]\n[actuator]\n" +
+            channel + "command = \"" + command + "\"\n[sensor.s]\n" + channel + "feedback = \"" +
+            feedback + "\"\n",
+        devices + "/rig.toml");
+    const config::Rig rig = config::read_rig(std::move(file));
+    EXPECT_NO_THROW(can_driver().configure({rig, &rig.actuator, {&rig.sensors.front()}}));
+    EXPECT_NO_THROW(rig.file->refuse_unread()) << entry.path();
+    ++profiles;
+  }
+  EXPECT_EQ(profiles, 7);
+}
+
+// What is said about an actuator section with these keys.
+std::string refusal(const std::string& keys) {
+  const auto file = RigFile::parse("[actuator]\n" + keys, "rig.toml");
+  try {
+    ConfigReader reader(std::nullopt, 2);
+    reader.command(Keys{file->section("actuator"), devices}, 0.0);
+    file->refuse_unread();
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CanConfig, DescribesASignalInPlace) {
+  EXPECT_EQ(refusal("id = 0x10\nbytes = [1, 2, 0, 0]\nstart_bit = 16\nbits = 16\n"
+                    "type = \"int\"\nscale = 0.5\nclamp_max = 5\nchecksum = \"none\"\n"),
+            "");
+}
+
+TEST(CanConfig, RefusalsNameFileLineKeyAndRule) {
+  EXPECT_THAT(refusal("start_bit = 0\n"), HasSubstr("rig.toml:1: [actuator] id: is missing"));
+  EXPECT_THAT(refusal("id = 0x900\nlength = 8\nstart_bit = 0\n"),
+              HasSubstr("rig.toml:2: [actuator] id = 0x900: identifier 2304 (with node_step · node "
+                        "added) is above 0x7FF; extended = true makes it a 29-bit one"));
+  EXPECT_THAT(refusal("id = 0x7FF\nnode_step = 1\nlength = 8\nstart_bit = 0\n"),
+              HasSubstr("identifier 2049"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 60\nbits = 8\n"),
+              HasSubstr("rig.toml:4: [actuator] start_bit = 60: signal at bits 60|8 Intel"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\nbits = 31\ntype = \"float32\"\n"),
+              HasSubstr("a float32 is 32 bits long"));
+  EXPECT_THAT(refusal("id = 1\nbytes = [1,2,3,4,5,6,7,8,9]\nstart_bit = 0\n"),
+              HasSubstr("a classic frame has up to 8 bytes"));
+  EXPECT_THAT(refusal("id = 1\nfd = true\nlength = 9\nstart_bit = 0\n"),
+              HasSubstr("a payload of 9 bytes does not exist in a CAN-FD frame"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\nrange = [1, -1]\n"),
+              HasSubstr("must be [value of code 0, value of the highest code]"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\nclamp_min = 2\nclamp_max = 1\n"),
+              HasSubstr("minimum must not be above maximum"));
+  EXPECT_THAT(
+      refusal("id = 1\nlength = 8\nstart_bit = 0\nchecksum = \"sum8\"\nchecksum_byte = 9\n"),
+      HasSubstr("byte 9 is outside a payload of 8 bytes"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\nscael = 2\n"),
+              HasSubstr("rig.toml:5: [actuator] scael: unknown key; did you mean scale?"));
+  EXPECT_THAT(refusal("signal = \"A.B\"\n"), HasSubstr("give the file with dbc"));
+  EXPECT_THAT(refusal("signal = \"A.B\"\ndbc = \"none.dbc\"\n"),
+              HasSubstr("none.dbc: the DBC file cannot be read"));
+  EXPECT_THAT(refusal("signal = \"Set_Input_Torque.Torque\"\ndbc = \"odrive-cansimple.dbc\"\n"),
+              HasSubstr("rig.toml:2: [actuator] signal = 'Set_Input_Torque.Torque':"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\n[[actuator.arm]]\nid = 2\n"),
+              HasSubstr("name: is missing"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\n[[actuator.keep_alive]]\nname = \"x\"\n"
+                      "period_s = 1\n"),
+              HasSubstr("needs a frame"));
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\n[[actuator.health]]\nname = \"x\"\n"
+                      "id = 3\nlength = 8\nstart_bit = 0\n"),
+              HasSubstr("exactly one of equals, not, at_most, at_least"));
+}
+
+}  // namespace
+}  // namespace sinerig::can
