@@ -21,6 +21,7 @@ constexpr const char* description =
     "  sinerig plan config/gimbal.toml     what would be run, and for how long; nothing moves\n"
     "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
+    "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
     "  sinerig export gimbal.sweep --format csv -o gimbal.csv";
 
 constexpr const char* footer =
@@ -51,6 +52,7 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   std::string file;
   RunOptions run_options;
   ExportOptions export_options;
+  ReportOptions report_options;
 
   CLI::App* plan = app.add_subcommand(
       "plan", "Print every dwell of a rig file and the total duration; refuse what can't be run");
@@ -78,6 +80,20 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
                        "sensor whose response the CSV holds (default: the first)");
   exporter->add_flag("--force", export_options.force, "replace the file if it exists");
 
+  CLI::App* reporter = app.add_subcommand(
+      "report", "Write a sweep file's report: one HTML page for any browser, or a picture");
+  reporter->add_option("FILE", report_options.file, "sweep file")->required();
+  reporter
+      ->add_option("--format", report_options.format,
+                   "html: the interactive page; svg or png: the Bode plot of one response")
+      ->check(CLI::IsMember({"html", "svg", "png"}))
+      ->capture_default_str();
+  reporter->add_option("-o,--output", report_options.output,
+                       "file to write (default: FILE's name with the format's extension)");
+  reporter->add_option("--channel", report_options.channel,
+                       "sensor that the picture shows (default: the first)");
+  reporter->add_flag("--force", report_options.force, "replace the file if it exists");
+
   CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
 
   try {
@@ -92,6 +108,7 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     if (run->parsed()) return run_command(run_options, drivers);
     if (show->parsed()) return show_command(file);
     if (exporter->parsed()) return export_command(export_options);
+    if (reporter->parsed()) return report_command(report_options);
     if (list->parsed()) return drivers_command(drivers);
   } catch (const config::ConfigError& error) {
     spdlog::error("{}", error.what());

@@ -30,10 +30,19 @@ struct ExportOptions {
   bool force = false;
 };
 
+struct ReportOptions {
+  std::string file;
+  std::string format = "html";  // html, svg or png
+  std::string output;           // empty: beside the file, replacing the report of before
+  std::string channel;          // of svg and png; empty: the first sensor
+  bool force = false;
+};
+
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
 int plan_command(const std::string& rig, const std::vector<DriverKit>& drivers);
 int show_command(const std::string& file);
 int export_command(const ExportOptions& options);
+int report_command(const ReportOptions& options);
 int drivers_command(const std::vector<DriverKit>& drivers);
 
 }  // namespace sinerig::cli
