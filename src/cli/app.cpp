@@ -19,7 +19,7 @@ constexpr const char* description =
     "time, over the bus it already has; or of a simulated plant, in no time.\n"
     "\n"
     "  sinerig plan config/gimbal.toml     what would be run, and for how long; nothing moves\n"
-    "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep\n"
+    "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
     "  sinerig export gimbal.sweep --format csv -o gimbal.csv";
@@ -64,6 +64,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
       "-o,--output", run_options.output,
       "sweep file to write (default: RIG's name + .sweep, here; numbered when it exists)");
   run->add_flag("--force", run_options.force, "replace the sweep file if it exists");
+  bool no_report = false;
+  run->add_flag("--no-report", no_report, "do not write the report NAME.html at the end");
 
   CLI::App* show =
       app.add_subcommand("show", "Print a sweep file: how the run went and its points");
@@ -92,7 +94,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
                        "file to write (default: FILE's name with the format's extension)");
   reporter->add_option("--channel", report_options.channel,
                        "sensor that the picture shows (default: the first)");
-  reporter->add_flag("--force", report_options.force, "replace the file if it exists");
+  reporter->add_flag("--force", report_options.force,
+                     "replace the file if it exists (a report is replaced anyway)");
 
   CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
 
@@ -102,6 +105,7 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     return app.exit(error) == 0 ? exit_done : exit_usage;
   }
   set_up_logging(log_level);
+  run_options.report = !no_report;
 
   try {
     if (plan->parsed()) return plan_command(rig, drivers);

@@ -20,6 +20,7 @@ struct RunOptions {
   std::string rig;
   std::string output;  // empty: NAME.sweep of the rig file, numbered when it exists
   bool force = false;
+  bool report = true;  // write NAME.html at the end
 };
 
 struct ExportOptions {
@@ -33,7 +34,7 @@ struct ExportOptions {
 struct ReportOptions {
   std::string file;
   std::string format = "html";  // html, svg or png
-  std::string output;           // empty: beside the file, replacing the report of before
+  std::string output;           // empty: FILE's name with the format's extension
   std::string channel;          // of svg and png; empty: the first sensor
   bool force = false;
 };

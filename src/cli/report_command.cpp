@@ -7,8 +7,8 @@
 #include "cli/chosen_response.h"
 #include "cli/commands.h"
 #include "cli/output_file.h"
+#include "cli/report_file.h"
 #include "report/figure.h"
-#include "report/html.h"
 #include "report/raster.h"
 
 namespace sinerig::cli {
@@ -22,6 +22,12 @@ constexpr double png_scale = 2.0;  // pixels per unit of the picture: sharp on p
 }  // namespace
 
 int report_command(const ReportOptions& options) {
+  if (options.format == "html") {
+    const std::string path = options.output.empty() ? report_path(options.file) : options.output;
+    write_report(options.file, path, options.force);
+    spdlog::info("wrote {}", path);
+    return exit_done;
+  }
   if (options.format == "png" && !report::has_raster()) report::png_from_svg("", png_scale);
   const report::LabelledRun run{.label = fs::path{options.file}.stem().string(),
                                 .run = record::read_sweep(options.file)};
@@ -29,20 +35,11 @@ int report_command(const ReportOptions& options) {
       options.output.empty()
           ? fs::path{options.file}.replace_extension("." + options.format).string()
           : options.output;
-  write_file(path, options.force || options.output.empty(), [&](std::ostream& stream) {
-    if (options.format == "html") {
-      write_html(stream, run);
-      return;
-    }
-    const record::StoredResponse& response =
-        chosen_response(run.run, options.file, options.channel);
-    if (options.format == "svg") {
-      write_bode_svg(stream, run, response);
-      return;
-    }
-    std::ostringstream picture;
-    write_bode_svg(picture, run, response);
-    stream << report::png_from_svg(picture.str(), png_scale);
+  std::ostringstream picture;
+  write_bode_svg(picture, run, chosen_response(run.run, options.file, options.channel));
+  write_file(path, options.force, [&](std::ostream& stream) {
+    stream << (options.format == "png" ? report::png_from_svg(picture.str(), png_scale)
+                                       : picture.str());
   });
   spdlog::info("wrote {}", path);
   return exit_done;
