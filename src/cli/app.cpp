@@ -19,8 +19,9 @@ constexpr const char* description =
     "time, over the bus it already has; or of a simulated plant, in no time.\n"
     "\n"
     "  sinerig plan config/gimbal.toml     what would be run, and for how long; nothing moves\n"
-    "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep\n"
+    "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
+    "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
     "  sinerig export gimbal.sweep --format csv -o gimbal.csv";
 
 constexpr const char* footer =
@@ -51,6 +52,7 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   std::string file;
   RunOptions run_options;
   ExportOptions export_options;
+  ReportOptions report_options;
 
   CLI::App* plan = app.add_subcommand(
       "plan", "Print every dwell of a rig file and the total duration; refuse what can't be run");
@@ -62,6 +64,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
       "-o,--output", run_options.output,
       "sweep file to write (default: RIG's name + .sweep, here; numbered when it exists)");
   run->add_flag("--force", run_options.force, "replace the sweep file if it exists");
+  bool no_report = false;
+  run->add_flag("--no-report", no_report, "do not write the report NAME.html at the end");
 
   CLI::App* show =
       app.add_subcommand("show", "Print a sweep file: how the run went and its points");
@@ -78,6 +82,21 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
                        "sensor whose response the CSV holds (default: the first)");
   exporter->add_flag("--force", export_options.force, "replace the file if it exists");
 
+  CLI::App* reporter = app.add_subcommand(
+      "report", "Write a sweep file's report: one HTML page for any browser, or a picture");
+  reporter->add_option("FILE", report_options.file, "sweep file")->required();
+  reporter
+      ->add_option("--format", report_options.format,
+                   "html: the interactive page; svg or png: the Bode plot of one response")
+      ->check(CLI::IsMember({"html", "svg", "png"}))
+      ->capture_default_str();
+  reporter->add_option("-o,--output", report_options.output,
+                       "file to write (default: FILE's name with the format's extension)");
+  reporter->add_option("--channel", report_options.channel,
+                       "sensor that the picture shows (default: the first)");
+  reporter->add_flag("--force", report_options.force,
+                     "replace the file if it exists (a report is replaced anyway)");
+
   CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
 
   try {
@@ -86,12 +105,14 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     return app.exit(error) == 0 ? exit_done : exit_usage;
   }
   set_up_logging(log_level);
+  run_options.report = !no_report;
 
   try {
     if (plan->parsed()) return plan_command(rig, drivers);
     if (run->parsed()) return run_command(run_options, drivers);
     if (show->parsed()) return show_command(file);
     if (exporter->parsed()) return export_command(export_options);
+    if (reporter->parsed()) return report_command(report_options);
     if (list->parsed()) return drivers_command(drivers);
   } catch (const config::ConfigError& error) {
     spdlog::error("{}", error.what());

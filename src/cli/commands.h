@@ -20,6 +20,7 @@ struct RunOptions {
   std::string rig;
   std::string output;  // empty: NAME.sweep of the rig file, numbered when it exists
   bool force = false;
+  bool report = true;  // write NAME.html at the end
 };
 
 struct ExportOptions {
@@ -30,10 +31,19 @@ struct ExportOptions {
   bool force = false;
 };
 
+struct ReportOptions {
+  std::string file;
+  std::string format = "html";  // html, svg or png
+  std::string output;           // empty: FILE's name with the format's extension
+  std::string channel;          // of svg and png; empty: the first sensor
+  bool force = false;
+};
+
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
 int plan_command(const std::string& rig, const std::vector<DriverKit>& drivers);
 int show_command(const std::string& file);
 int export_command(const ExportOptions& options);
+int report_command(const ReportOptions& options);
 int drivers_command(const std::vector<DriverKit>& drivers);
 
 }  // namespace sinerig::cli

@@ -10,6 +10,7 @@
 
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
+#include "cli/report_file.h"
 #include "record/recorder.h"
 #include "record/sweep_reader.h"
 #include "report/terminal.h"
@@ -139,6 +140,17 @@ int exit_code(const RunOutcome& outcome) {
   return outcome.trip.cause == TripCause::stop_requested ? exit_interrupted : exit_stopped;
 }
 
+// The run is safe in its file: a report that cannot be written is a warning.
+void report_beside(const std::string& sweep_file) {
+  const std::string path = report_path(sweep_file);
+  try {
+    write_report(sweep_file, path, false);
+    spdlog::info("wrote {}, the report: open it in a browser", path);
+  } catch (const std::exception& error) {
+    spdlog::warn("no report: {}", error.what());
+  }
+}
+
 }  // namespace
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers) {
@@ -187,6 +199,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
                  outbox.dropped_samples());
   }
   spdlog::info("wrote {}", path);
+  if (options.report) report_beside(path);
   return exit_code(outcome);
 }
 

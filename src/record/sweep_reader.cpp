@@ -83,7 +83,8 @@ std::vector<StoredResponse> read_responses(Database& database) {
                       .seconds = rows.number(20),
                       .status = rows.text(21),
                       .reason = rows.text(22),
-                      .reason_value = rows.number(23)};
+                      .reason_value = rows.number(23),
+                      .more = {}};
     const bool same_pair = !responses.empty() && responses.back().input == point.input &&
                            responses.back().output == point.output;
     if (!same_pair)
@@ -147,6 +148,8 @@ StoredRun read_sweep(const std::string& path) {
     run.channels.push_back({.name = channels.text(0), .unit = channels.text(1)});
   run.plan = read_plan(database, std::strtod(run.fact("rate_hz").c_str(), nullptr));
   run.responses = read_responses(database);
+  read_more_columns(database, run.responses);
+  run.fits = read_fits(database);
   run.events = read_events(database);
   run.timings = read_timings(database);
   return run;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "record/more_columns.h"
 #include "record/sweep_writer.h"
 
 namespace sinerig::record {
@@ -31,6 +32,7 @@ struct StoredPoint {
   std::string status;
   std::string reason;
   double reason_value = 0.0;
+  std::map<std::string, double> more;  // columns that have no member above, by name
 };
 
 struct StoredEvent {
@@ -67,6 +69,7 @@ struct StoredRun {
   std::vector<StoredResponse> responses;
   std::vector<StoredEvent> events;
   std::vector<StoredTiming> timings;
+  std::vector<StoredFit> fits;
 
   // A fact, empty where the file has none.
   std::string fact(const std::string& key) const;

@@ -1,0 +1,18 @@
+// The report beside a sweep file.
+#pragma once
+
+#include <string>
+
+namespace sinerig::cli {
+
+// NAME.html for NAME.sweep.
+std::string report_path(const std::string& sweep_file);
+
+// True for a page that this program wrote: it may be replaced without asking.
+bool is_report(const std::string& path);
+
+// Reads the sweep file and writes its report to `path`. Throws record::FileExists when something
+// else is there and is not to be replaced.
+void write_report(const std::string& sweep_file, const std::string& path, bool force);
+
+}  // namespace sinerig::cli

@@ -1,0 +1,46 @@
+// Whether two measurements of the same pair of channels differ by more than their scatter explains.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "record/sweep_reader.h"
+
+namespace sinerig::record {
+
+struct CompareSettings {
+  double tolerance_db = 0.0;   // a smaller change of the gain is none …
+  double tolerance_deg = 0.0;  // … when that of the phase is smaller than this, too
+  double false_alarm = 0.01;   // chance to call two equal responses different, over all points
+};
+
+// H_other / H_first at one frequency that both have measured.
+struct PointDifference {
+  double frequency_hz = 0.0;
+  double gain_db = 0.0;
+  double phase_deg = 0.0;  // within half a turn
+  double gain95_db = 0.0;  // half-widths of the joint 95 % intervals; NaN without covariances
+  double phase95_deg = 0.0;
+  double probability = 0.0;  // of a difference at least as large from scatter alone; NaN as above
+  bool changed = false;
+};
+
+struct Difference {
+  std::string name;  // of the channels, for people
+  std::vector<PointDifference> points;
+  std::size_t unmatched = 0;  // frequencies that only one of the two has
+  std::size_t unusable = 0;   // matched, but without a usable point in one of the two
+
+  std::size_t changed_points() const;
+  bool changed() const { return changed_points() > 0; }
+};
+
+// Points match when their frequencies agree within 1e-6; only points with status good, or imported,
+// are compared. The scatter of each is taken as circular (circular_variance), both are added with
+// the degrees of freedom of Welch and Satterthwaite, and p = (1 + |d|²/(ν s²))^(−ν/2), the tail of
+// F(2, ν). A point has changed when p is below false_alarm divided by the number of points and the
+// change is above a tolerance; points without known scatter go by the tolerances alone.
+Difference compare_responses(const StoredResponse& first, const StoredResponse& other,
+                             const CompareSettings& settings);
+
+}  // namespace sinerig::record

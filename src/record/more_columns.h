@@ -1,0 +1,39 @@
+// What a sweep file holds beyond the values that the reader knows by name: figures of a point, and
+// the models fitted to a response.
+#pragma once
+
+#include <complex>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace sinerig::record {
+
+class Database;
+struct StoredResponse;
+
+// A model of one response, from the table `fit`.
+struct StoredFit {
+  std::uint32_t input = 0;
+  std::uint32_t output = 0;
+  std::string label;        // the method where the file says it
+  std::vector<double> num;  // descending powers of s
+  std::vector<double> den;  // descending powers of s
+  double delay_s = 0.0;
+  double hold_period_s = 0.0;               // of the zero-order hold in front of it, 0 = none
+  std::vector<std::complex<double>> poles;  // rad/s; empty where the file does not hold them
+  std::vector<std::complex<double>> zeros;
+  std::vector<std::pair<std::string, std::string>> facts;  // all that is a single value
+};
+
+// Fills StoredPoint::more with the numeric columns of `point` that are not named in the reader.
+// Columns that hold nothing are left out.
+void read_more_columns(Database& database, std::vector<StoredResponse>& responses);
+
+// The table `fit`, empty where the file has none. Each row has `input` and `output`, and either the
+// columns num, den (JSON arrays) and delay_s or one column with a JSON object of these keys;
+// rows with neither are passed over.
+std::vector<StoredFit> read_fits(Database& database);
+
+}  // namespace sinerig::record

@@ -1,0 +1,244 @@
+#include "report/report_data.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <nlohmann/json.hpp>
+
+#include "record/confidence.h"
+#include "report/model_curve.h"
+#include "report/run_summary.h"
+
+namespace sinerig::report {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+using record::StoredPoint;
+using record::StoredResponse;
+using record::StoredRun;
+
+// Points of a model's curve, besides those that were measured.
+constexpr std::size_t curve_points = 400;
+
+// To so many significant digits; null where there is no number.
+Json number(double value, int digits) {
+  if (!std::isfinite(value)) return nullptr;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return std::strtod(text, nullptr);
+}
+
+template <typename Value>
+Json column(const std::vector<StoredPoint>& points, int digits, Value value) {
+  Json all = Json::array();
+  for (const StoredPoint& point : points) all.push_back(number(value(point), digits));
+  return all;
+}
+
+template <typename Value>
+Json texts(const std::vector<StoredPoint>& points, Value value) {
+  Json all = Json::array();
+  for (const StoredPoint& point : points) all.push_back(value(point));
+  return all;
+}
+
+Json roots_json(const std::vector<std::complex<double>>& roots) {
+  Json all = Json::array();
+  for (const auto& root : roots) all.push_back({number(root.real(), 9), number(root.imag(), 9)});
+  return all;
+}
+
+Json model_json(const record::StoredFit& fit, const StoredResponse& response) {
+  Json model{{"label", fit.label}, {"f", Json::array()}, {"re", Json::array()}};
+  model["im"] = model["at_re"] = model["at_im"] = Json::array();
+  std::vector<double> grid;
+  for (const StoredPoint& point : response.points) {
+    grid.push_back(point.frequency_hz);
+    const std::complex<double> value = model_at(fit, point.frequency_hz);
+    model["at_re"].push_back(number(value.real(), 9));
+    model["at_im"].push_back(number(value.imag(), 9));
+  }
+  for (const double each : log_grid(grid.front(), grid.back(), curve_points)) grid.push_back(each);
+  std::sort(grid.begin(), grid.end());
+  for (const double frequency_hz : grid) {
+    const std::complex<double> value = model_at(fit, frequency_hz);
+    model["f"].push_back(number(frequency_hz, 8));
+    model["re"].push_back(number(value.real(), 7));
+    model["im"].push_back(number(value.imag(), 7));
+  }
+  model["facts"] = fit.facts;
+  model["poles"] = roots_json(fit.poles);
+  model["zeros"] = roots_json(fit.zeros);
+  return model;
+}
+
+Json models_json(const StoredRun& run, const StoredResponse& response) {
+  Json models = Json::array();
+  if (response.points.empty()) return models;
+  for (const record::StoredFit& fit : run.fits) {
+    if (fit.input == response.input && fit.output == response.output)
+      models.push_back(model_json(fit, response));
+  }
+  return models;
+}
+
+// Figures that get a plot each only where they hold something.
+Json more_json(const std::vector<StoredPoint>& points) {
+  std::map<std::string, std::vector<double>> columns;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const auto put = [&](const std::string& name, double value) {
+      columns.try_emplace(name, points.size(), std::nan("")).first->second[i] = value;
+    };
+    put("bench time, s", points[i].seconds);
+    put("samples lost", points[i].lost);
+    put("drift per s", points[i].drift_per_s);
+    for (const auto& [name, value] : points[i].more) put(name, value);
+  }
+  Json more = Json::object();
+  for (const auto& [name, values] : columns) {
+    const bool empty = std::none_of(values.begin(), values.end(), [](double value) {
+      return std::isfinite(value) && value != 0.0;
+    });
+    if (empty) continue;
+    for (const double value : values) more[name].push_back(number(value, 6));
+  }
+  return more;
+}
+
+Json response_json(const StoredRun& run, const StoredResponse& response, const std::string& name,
+                   std::size_t run_index) {
+  const std::vector<StoredPoint>& points = response.points;
+  Json json{{"run", run_index},
+            {"name", name},
+            {"unit", response_unit(run, response)},
+            {"input_unit", run.channels.at(response.input).unit},
+            {"output_unit", run.channels.at(response.output).unit}};
+  json["f"] = column(points, 9, [](const auto& p) { return p.frequency_hz; });
+  json["re"] = column(points, 9, [](const auto& p) { return p.response.real(); });
+  json["im"] = column(points, 9, [](const auto& p) { return p.response.imag(); });
+  json["var_re"] = column(points, 4, [](const auto& p) { return p.covariance.re_re; });
+  json["cov_re_im"] = column(points, 4, [](const auto& p) { return p.covariance.re_im; });
+  json["var_im"] = column(points, 4, [](const auto& p) { return p.covariance.im_im; });
+  json["gain95"] = column(points, 5, [](const auto& p) { return half_width95(p).gain; });
+  json["phase95"] = column(points, 5, [](const auto& p) { return half_width95(p).phase_rad; });
+  json["snr"] = column(points, 5, [](const auto& p) { return p.snr_db; });
+  json["amplitude"] = column(points, 6, [](const auto& p) { return p.input_amplitude; });
+  json["response"] = column(points, 6, [](const auto& p) { return p.output_amplitude; });
+  json["distortion"] = column(points, 5, [](const auto& p) { return p.distortion; });
+  json["samples"] = column(points, 8, [](const auto& p) { return p.samples; });
+  json["status"] = texts(points, [](const auto& p) { return p.status; });
+  json["reason"] = texts(points, [](const auto& p) { return p.reason; });
+  json["extra"] = more_json(points);
+  json["models"] = models_json(run, response);
+  return json;
+}
+
+Json difference_json(const record::Difference& difference) {
+  Json json{{"name", difference.name},
+            {"verdict", std::to_string(difference.changed_points()) + " of " +
+                            std::to_string(difference.points.size()) + " changed"}};
+  const auto add = [&](const char* key, int digits, auto value) {
+    json[key] = Json::array();
+    for (const record::PointDifference& point : difference.points)
+      json[key].push_back(number(value(point), digits));
+  };
+  add("f", 9, [](const auto& p) { return p.frequency_hz; });
+  add("gain_db", 7, [](const auto& p) { return p.gain_db; });
+  add("gain95_db", 5, [](const auto& p) { return p.gain95_db; });
+  add("phase_deg", 7, [](const auto& p) { return p.phase_deg; });
+  add("phase95_deg", 5, [](const auto& p) { return p.phase95_deg; });
+  add("p", 3, [](const auto& p) { return p.probability; });
+  json["changed"] = Json::array();
+  for (const record::PointDifference& point : difference.points)
+    json["changed"].push_back(point.changed);
+  return json;
+}
+
+const std::vector<std::string>& notes() {
+  static const std::vector<std::string> text{
+      "H is the ratio of two measured Fourier coefficients, output over input: with the input "
+      "A₀ sin ωt and the steady output a₀ + a₁ cos ωt + b₁ sin ωt the gain is √(a₁² + b₁²)/A₀ and "
+      "the phase atan2(a₁, b₁); a lag is negative.",
+      "Intervals hold the true value in 95 of 100 cases. Signal to noise is the power of the tone "
+      "over that of the residual, per sample; distortion is that of the harmonics, relative to the "
+      "tone. Points are drawn whatever their status; only good ones are filled.",
+      "The rig saw a zero-order hold at the rate of the loop; the measured response includes it."};
+  return text;
+}
+
+}  // namespace
+
+std::string response_name(const StoredRun& run, const StoredResponse& response) {
+  const std::string& output = run.channels.at(response.output).name;
+  const std::string& input = run.channels.at(response.input).name;
+  return input == "applied" || input.empty() ? output : output + " / " + input;
+}
+
+std::string response_unit(const StoredRun& run, const StoredResponse& response) {
+  const auto bracketed = [](const std::string& unit) {
+    return unit.find('/') == std::string::npos ? unit : "(" + unit + ")";
+  };
+  const std::string& input = run.channels.at(response.input).unit;
+  const std::string& output = run.channels.at(response.output).unit;
+  if (input == output) return "1";
+  if (input == "1" || input.empty()) return output;
+  return (output.empty() ? "1" : bracketed(output)) + "/" + bracketed(input);
+}
+
+Json page_of_run(const LabelledRun& labelled) {
+  const StoredRun& run = labelled.run;
+  Json responses = Json::array();
+  for (const StoredResponse& response : run.responses)
+    responses.push_back(response_json(run, response, response_name(run, response), 0));
+  const std::string outcome = run.fact("outcome");
+  return {{"kind", "run"},
+          {"title", labelled.label},
+          {"about", about_run(run)},
+          {"outcome", outcome},
+          {"outcome_text", outcome_text(run)},
+          {"summary", summary_facts(run)},
+          {"runs", Json::array({run_json(labelled)})},
+          {"responses", responses},
+          {"differences", Json::array()},
+          {"notes", notes()}};
+}
+
+Json page_of_comparison(const std::vector<LabelledRun>& runs,
+                        const std::vector<record::Difference>& differences) {
+  std::string title;
+  Json run_list = Json::array();
+  Json responses = Json::array();
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    title += (i == 0 ? "" : i == 1 ? " against " : ", ") + runs[i].label;
+    run_list.push_back(run_json(runs[i]));
+    for (const StoredResponse& response : runs[i].run.responses) {
+      const std::string name = runs[i].label + " " + response_name(runs[i].run, response);
+      responses.push_back(response_json(runs[i].run, response, name, i));
+    }
+  }
+  std::size_t changed = 0;
+  Json differences_list = Json::array();
+  Json summary = Json::array();
+  for (const record::Difference& each : differences) {
+    changed += each.changed_points();
+    differences_list.push_back(difference_json(each));
+    summary.push_back(
+        {each.name, std::to_string(each.changed_points()) + " changed",
+         "of " + std::to_string(each.points.size()) + " points" +
+             (each.unmatched > 0 ? ", " + std::to_string(each.unmatched) + " unmatched" : "")});
+  }
+  return {{"kind", "compare"},
+          {"title", title},
+          {"about", "each later file against the first, at the frequencies that both have"},
+          {"outcome", changed == 0 ? "done" : "changed"},
+          {"outcome_text", changed == 0 ? "same within the scatter" : "changed"},
+          {"summary", summary},
+          {"runs", run_list},
+          {"responses", responses},
+          {"differences", differences_list},
+          {"notes", notes()}};
+}
+
+}  // namespace sinerig::report

@@ -1,0 +1,33 @@
+// What a report shows, as the JSON object that its page reads: runs, responses with intervals,
+// models, differences. Numbers are cut to what a plot can show; exports hold them in full.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "record/compare.h"
+#include "record/sweep_reader.h"
+
+namespace sinerig::report {
+
+struct LabelledRun {
+  std::string label;  // unique among the runs of one report
+  record::StoredRun run;
+};
+
+// "encoder", or "gyro / encoder" where the input is not what was applied.
+std::string response_name(const record::StoredRun& run, const record::StoredResponse& response);
+
+// Unit of H: "rad/Nm", "(rad/s)/Nm", "1" where both channels have the same.
+std::string response_unit(const record::StoredRun& run, const record::StoredResponse& response);
+
+// The page of one run.
+nlohmann::ordered_json page_of_run(const LabelledRun& run);
+
+// The page that lays several runs over each other; each difference is against the first.
+nlohmann::ordered_json page_of_comparison(const std::vector<LabelledRun>& runs,
+                                          const std::vector<record::Difference>& differences);
+
+}  // namespace sinerig::report

@@ -1,0 +1,78 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "support/program.h"
+
+namespace sinerig {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr const char* short_rig = R"([loop]
+rate_hz = 500
+[sweep]
+start_hz = 2
+stop_hz = 40
+points = 6
+amplitude = 0.1
+settle_s = 0.1
+[limits]
+[actuator]
+driver = "sim"
+[sensor.position]
+driver = "sim"
+noise_rms = 1e-3
+[plant]
+kind = "transfer_function"
+num = [100.0]
+den = [1.0, 100.0]
+)";
+
+class ReportCommand : public testing::Test {
+ protected:
+  void SetUp() override { workshop_.write("axis.toml", short_rig); }
+  test::Workshop workshop_;
+};
+
+TEST_F(ReportCommand, RunLeavesAReportAndSaysWhere) {
+  const auto run = workshop_.sinerig("run axis.toml");
+  EXPECT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_THAT(run.errors, HasSubstr("wrote axis.html"));
+  EXPECT_THAT(workshop_.read("axis.html"), HasSubstr("<title>axis – sinerig</title>"));
+}
+
+TEST_F(ReportCommand, RunWritesNoneWhenToldSo) {
+  EXPECT_EQ(workshop_.sinerig("run axis.toml --no-report").exit_code, 0);
+  EXPECT_TRUE(workshop_.has("axis.sweep"));
+  EXPECT_FALSE(workshop_.has("axis.html"));
+}
+
+TEST_F(ReportCommand, RunLeavesAForeignPageAloneAndStillSucceeds) {
+  workshop_.write("axis.html", "my notes");
+  const auto run = workshop_.sinerig("run axis.toml");
+  EXPECT_EQ(run.exit_code, 0);
+  EXPECT_THAT(run.errors, HasSubstr("no report: axis.html: exists already"));
+  EXPECT_EQ(workshop_.read("axis.html"), "my notes");
+}
+
+TEST_F(ReportCommand, ReplacesItsOwnReportOnly) {
+  workshop_.sinerig("run axis.toml");
+  EXPECT_EQ(workshop_.sinerig("report axis.sweep").exit_code, 0);
+  workshop_.write("axis.html", "my notes");
+  EXPECT_EQ(workshop_.sinerig("report axis.sweep").exit_code, 2);
+  EXPECT_EQ(workshop_.sinerig("report axis.sweep --force").exit_code, 0);
+}
+
+TEST_F(ReportCommand, DrawsAPicture) {
+  workshop_.sinerig("run axis.toml --no-report");
+  EXPECT_EQ(workshop_.sinerig("report axis.sweep --format svg -o plot.svg").exit_code, 0);
+  EXPECT_THAT(workshop_.read("plot.svg"), testing::StartsWith("<svg "));
+  const auto png = workshop_.sinerig("report axis.sweep --format png");
+  EXPECT_EQ(png.exit_code == 0, workshop_.has("axis.png"));
+  const auto unknown = workshop_.sinerig("report axis.sweep --format svg --channel nose --force");
+  EXPECT_EQ(unknown.exit_code, 1);
+  EXPECT_THAT(unknown.errors, HasSubstr("has no response of \"nose\"; it has position"));
+}
+
+}  // namespace
+}  // namespace sinerig

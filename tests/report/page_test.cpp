@@ -1,0 +1,233 @@
+// The report in a real browser: it renders, its switches and cursors work, nothing complains.
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "report/html.h"
+#include "support/browser.h"
+#include "support/stored_runs.h"
+
+namespace sinerig::report {
+namespace {
+
+class Page : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto program = test::Browser::find();
+    if (!program) GTEST_SKIP() << "no Chromium here (Debian: apt install chromium)";
+    browser_ = std::make_unique<test::Browser>(*program);
+  }
+
+  void TearDown() override {
+    if (!path_.empty()) std::filesystem::remove(path_);
+  }
+
+  // `save` names a picture that is kept in $SINERIG_SCREENSHOTS, for people to look at.
+  void keep_picture(const std::string& save) {
+    const char* folder = std::getenv("SINERIG_SCREENSHOTS");
+    if (folder == nullptr) return;
+    std::ofstream{std::string{folder} + "/" + save + ".png", std::ios::binary}
+        << browser_->screenshot();
+  }
+
+  void show(const LabelledRun& run, int width = 1440, int height = 900) {
+    write([&](std::ostream& stream) { write_html(stream, run); });
+    browser_->open("file://" + path_, width, height);
+  }
+
+  template <typename Writer>
+  void write(Writer writer) {
+    path_ = (std::filesystem::temp_directory_path() /
+             ("sinerig-page-" + std::to_string(getpid()) + ".html"))
+                .string();
+    std::ofstream stream{path_};
+    writer(stream);
+  }
+
+  std::string text(const std::string& selector) {
+    return browser_->evaluate("document.querySelector('" + selector + "').textContent");
+  }
+
+  void press(const std::string& label) {
+    browser_->evaluate(
+        "[...document.querySelectorAll('#bar button')].find(b => b.textContent === '" + label +
+        "').click()");
+  }
+
+  // A place in the plot: parts of its width and height, in pixels of the window.
+  std::pair<double, double> place(const std::string& id, double x, double y) {
+    const auto box =
+        browser_->evaluate("(r => [r.left, r.top, r.width, r.height])(document.getElementById('" +
+                           id + "').getBoundingClientRect())");
+    return {box[0].get<double>() + x * box[2].get<double>(),
+            box[1].get<double>() + y * box[3].get<double>()};
+  }
+
+  void expect_no_errors() { EXPECT_TRUE(browser_->errors().empty()) << browser_->errors().front(); }
+
+  std::unique_ptr<test::Browser> browser_;
+  std::string path_;
+};
+
+LabelledRun run_of(std::size_t points) {
+  return {.label = "axis", .run = test::two_channel_run(points)};
+}
+
+TEST_F(Page, DrawsEveryPlotWithoutAnError) {
+  show(run_of(40));
+  for (const char* id : {"gain", "phase", "nyquist", "gain95", "phase95", "snr", "amplitude",
+                         "response", "lateness", "histogram"}) {
+    const std::string inside = "!!document.querySelector('#" + std::string{id} + " svg path')";
+    EXPECT_TRUE(browser_->evaluate(inside).get<bool>()) << id;
+  }
+  EXPECT_EQ(text("h1"), "axis");
+  EXPECT_FALSE(
+      browser_->evaluate("document.getElementById('main').innerHTML.includes('NaN')").get<bool>());
+  EXPECT_FALSE(browser_->evaluate("document.body.innerText.includes('undefined')").get<bool>());
+  EXPECT_TRUE(
+      browser_->evaluate("document.querySelector('pre').textContent.includes('<fast> & ')"));
+  keep_picture("report");
+  expect_no_errors();
+}
+
+TEST_F(Page, MarksPointsByStatus) {
+  show(run_of(40));
+  const auto shown = browser_->evaluate(
+      "[...document.querySelectorAll('#gain [data-status]')].map(m => m.dataset.status).sort()");
+  EXPECT_EQ(shown,
+            nlohmann::json({"clipped", "distorted", "good", "low_signal", "rt_fault", "stopped"}));
+  EXPECT_NE(text("#bode .legend").find("low signal"), std::string::npos);
+}
+
+TEST_F(Page, SwitchesUnits) {
+  show(run_of(41));
+  const auto [x, y] = place("gain", 0.53, 0.5);
+  browser_->move_mouse(x, y);
+  // The 21st of 41 points from 1 to 100 Hz is the corner of the lag: 2/√2, −45°.
+  EXPECT_EQ(text(".readout .at"), "10.0000 Hz");
+  EXPECT_EQ(text("[data-value=gain]").substr(0, 5), "3.010");
+  EXPECT_EQ(text("[data-value=phase]").substr(0, 8), "−45.00");
+  press("rad/s");
+  EXPECT_EQ(text(".readout .at"), "62.8319 rad/s");
+  press("absolute");
+  EXPECT_EQ(text("[data-value=gain]").substr(0, 6), "1.4142");
+  EXPECT_NE(text("#bode h3").find("times 1 rad/Nm"), std::string::npos);
+  press("radians");
+  EXPECT_EQ(text("[data-value=phase]").substr(0, 9), "−0.7854");
+  EXPECT_NE(text("#phase svg").find("π"), std::string::npos);
+  press("wrapped");
+  expect_no_errors();
+}
+
+TEST_F(Page, ShowsSeveralChannels) {
+  show(run_of(30));
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#gain .curve').length"), 1);
+  press("gyro");
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#gain .curve').length"), 2);
+  press("encoder");
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#gain .curve').length"), 1);
+  EXPECT_NE(text("#bode h3").find("(rad/s)/Nm"), std::string::npos);
+  expect_no_errors();
+}
+
+TEST_F(Page, LinksTheCursorOfAllPlots) {
+  show(run_of(40));
+  const auto [x, y] = place("phase", 0.5, 0.5);
+  browser_->move_mouse(x, y);
+  const auto lines = browser_->evaluate(
+      "['gain', 'phase', 'snr', 'lateness'].map(id => document.querySelector(`#${id} .over path`) "
+      "!== null)");
+  EXPECT_EQ(lines, nlohmann::json({true, true, true, true}));
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#nyquist .spot').length"), 1);
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('.points tr.at').length"), 1);
+  browser_->click(x, y);
+  browser_->move_mouse(5, 5);
+  EXPECT_NE(text(".readout .at").find("kept"), std::string::npos);
+  const std::string before = text(".readout .at");
+  browser_->press_key("ArrowRight");
+  EXPECT_NE(text(".readout .at"), before);
+  browser_->press_key("Escape");
+  EXPECT_EQ(text(".readout .at"), "point at a plot");
+  expect_no_errors();
+}
+
+TEST_F(Page, ZoomsAllPlotsByADrag) {
+  show(run_of(60));
+  const auto labels = "[...document.querySelectorAll('#snr text')].map(t => t.textContent).join()";
+  const auto whole = browser_->evaluate(labels);
+  const auto [x0, y0] = place("gain", 0.4, 0.5);
+  const auto [x1, y1] = place("gain", 0.6, 0.5);
+  browser_->drag(x0, y0, x1, y1);
+  EXPECT_NE(browser_->evaluate(labels), whole);
+  keep_picture("zoomed");
+  browser_->double_click(x0, y0);
+  EXPECT_EQ(browser_->evaluate(labels), whole);
+  browser_->drag(x0, y0, x1, y1);
+  press("whole range");
+  EXPECT_EQ(browser_->evaluate(labels), whole);
+  expect_no_errors();
+}
+
+TEST_F(Page, IsLightAndDark) {
+  browser_->prefer_dark(true);
+  show(run_of(20));
+  const auto paper = "getComputedStyle(document.documentElement).backgroundColor";
+  const auto dark = browser_->evaluate(paper);
+  keep_picture("dark");
+  press("light / dark");
+  EXPECT_NE(browser_->evaluate(paper), dark);
+  browser_->prefer_dark(false);
+  press("light / dark");
+  EXPECT_EQ(browser_->evaluate(paper), dark);
+  expect_no_errors();
+}
+
+TEST_F(Page, ShowsAModelWithItsResidual) {
+  LabelledRun run = run_of(40);
+  run.run.fits = {test::lag_fit()};
+  show(run);
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#gain .model').length"), 1);
+  // The model is exact: every residual sits on zero, inside its interval.
+  EXPECT_EQ(
+      browser_->evaluate("document.querySelector('#residual-gain .outside').getAttribute('d')"),
+      "");
+  EXPECT_TRUE(browser_->evaluate("!!document.querySelector('#poles-0 svg')").get<bool>());
+  keep_picture("model");
+  expect_no_errors();
+}
+
+TEST_F(Page, FitsANarrowWindow) {
+  show(run_of(40), 390, 800);
+  EXPECT_LE(browser_->evaluate("document.documentElement.scrollWidth").get<int>(), 390)
+      << browser_->evaluate(
+             "[...document.querySelectorAll('body *')].filter(e => "
+             "e.getBoundingClientRect().right > 391 && !e.closest('.scroll, pre'))"
+             ".slice(0, 9).map(e => e.tagName + '.' + e.className)");
+  keep_picture("narrow");
+  expect_no_errors();
+}
+
+TEST_F(Page, SurvivesARunWithoutPoints) {
+  LabelledRun run{.label = "empty", .run = {}};
+  run.run.facts = {{"outcome", "stopped"}, {"outcome_detail", "encoder above its limit"}};
+  show(run);
+  EXPECT_NE(text("main").find("No point was finished"), std::string::npos);
+  show(run_of(1));
+  expect_no_errors();
+}
+
+TEST_F(Page, HoldsFiveHundredPointsInUnderAMegabyte) {
+  show(run_of(500));
+  EXPECT_LT(std::filesystem::file_size(path_), 1'000'000U);
+  const double opened_ms =
+      browser_->evaluate("performance.getEntriesByType('navigation')[0].loadEventStart");
+  RecordProperty("opened_ms", std::to_string(opened_ms));
+  EXPECT_GT(opened_ms, 0.0);
+  expect_no_errors();
+}
+
+}  // namespace
+}  // namespace sinerig::report
