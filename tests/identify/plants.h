@@ -1,6 +1,7 @@
 // Plants and noise that the tests and the benchmark of identification share.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstdint>
