@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <random>
 
 #include "identify/starts.h"
 
@@ -14,7 +15,7 @@ using Eigen::ArrayXd;
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double false_alarm = 1e-3;  // per response
+constexpr double false_alarm = 1e-4;  // per response
 constexpr double trimmed_part = 0.85;
 constexpr int bounded_rounds = 5;
 constexpr int redescending_rounds = 5;
@@ -23,6 +24,8 @@ constexpr double tukey_limit = 6.0;
 constexpr double least_trust = 1e-8;
 constexpr double most_rejected = 0.15;
 constexpr int most_reselections = 10;
+constexpr std::size_t most_candidates = 6;
+constexpr double subset_part = 0.7;
 
 double lower_sum(ArrayXd squared, double part) {
   const auto count = static_cast<Index>(part * static_cast<double>(squared.size()));
@@ -43,8 +46,7 @@ double noise_variance(const FitData& data, const ArrayXd& squared) {
 }
 
 double rejection_limit(const FitData& data, const ArrayXd& squared) {
-  const double quantile = 2.0 * std::log(static_cast<double>(data.points()) / false_alarm);
-  return quantile * noise_variance(data, squared);
+  return cost_of_outlier(data) * noise_variance(data, squared);
 }
 
 ArrayXd residual_of(const FitData& data, const GridRational& rational) {
@@ -176,6 +178,51 @@ std::optional<RobustFit> settle(const FitData& data, const Freedom& freedom,
   return fit;
 }
 
+// A fit of part of the points has a fair chance to hold no outlier at all.
+std::optional<Candidate> from_random_subset(const FitData& data, const Freedom& freedom,
+                                            std::mt19937_64& random) {
+  std::vector<Index> order(static_cast<std::size_t>(data.points()));
+  std::iota(order.begin(), order.end(), Index{0});
+  std::shuffle(order.begin(), order.end(), random);
+  order.resize(static_cast<std::size_t>(subset_part * static_cast<double>(data.points())));
+  std::sort(order.begin(), order.end());
+  if (2 * static_cast<int>(order.size()) < freedom.parameters() + 2) return {};
+  const FitData part = data.subset(order);
+  SearchSettings settings;
+  settings.effort = Effort::quick;
+  settings.random_starts = 0;
+  const Refined refined = search(part, freedom, settings);
+  if (!std::isfinite(refined.rational.cost)) return {};
+  Candidate candidate;
+  candidate.rational = extended(part, freedom, refined.rational, data);
+  candidate.squared = residual_of(data, candidate.rational);
+  if (!candidate.squared.allFinite()) return {};
+  return candidate;
+}
+
+// A point left out costs what the threshold is worth, so of two explanations the one with fewer
+// outliers wins.
+std::optional<RobustFit> least_penalised(const std::vector<RobustFit>& fits, const FitData& data,
+                                         const Freedom& freedom) {
+  double variance = data.scatter_known ? 1.0 : std::numeric_limits<double>::infinity();
+  const auto per_value = [&](const RobustFit& fit) {
+    const auto values = static_cast<double>(2 * fit.kept.size());
+    return fit.refined.rational.cost / std::max(values - freedom.parameters(), 1.0);
+  };
+  if (!data.scatter_known)
+    for (const RobustFit& fit : fits) variance = std::min(variance, per_value(fit));
+  variance = std::max(variance, 1e-24);
+  const double limit = cost_of_outlier(data);
+  const auto penalised = [&](const RobustFit& fit) {
+    return fit.refined.rational.cost / variance + limit * static_cast<double>(fit.outliers.size());
+  };
+  const auto best = std::min_element(
+      fits.begin(), fits.end(),
+      [&](const RobustFit& a, const RobustFit& b) { return penalised(a) < penalised(b); });
+  if (best == fits.end()) return {};
+  return *best;
+}
+
 }  // namespace
 
 ArrayXd squared_residuals(const FitData& data, const VectorXd& residual) {
@@ -183,24 +230,27 @@ ArrayXd squared_residuals(const FitData& data, const VectorXd& residual) {
   return residual.head(g).array().square() + residual.tail(g).array().square();
 }
 
+double cost_of_outlier(const FitData& data) {
+  return 2.0 * std::log(static_cast<double>(data.points()) / false_alarm);
+}
+
 bool outliers_suspected(const FitData& data, const VectorXd& residual) {
   const ArrayXd squared = squared_residuals(data, residual);
   return squared.maxCoeff() > rejection_limit(data, squared);
 }
 
-std::optional<RobustFit> fit_robustly(const FitData& data, const Freedom& freedom) {
+std::optional<RobustFit> fit_robustly(const FitData& data, const Freedom& freedom,
+                                      int random_subsets) {
   if (2 * data.points() < 2 * freedom.parameters() + 4) return {};
+  std::vector<RobustFit> fits;
   const auto found = candidates(data, freedom);
-  std::optional<RobustFit> best;
-  const auto cost_per_point = [](const RobustFit& fit) {
-    return fit.refined.rational.cost / static_cast<double>(fit.kept.size());
-  };
-  for (std::size_t i = 0; i < std::min<std::size_t>(found.size(), 8); ++i) {
-    auto fit = settle(data, freedom, found[i]);
-    if (fit && (!best || cost_per_point(*fit) < cost_per_point(*best))) best = std::move(fit);
-    if (best && data.scatter_known) break;
-  }
-  return best;
+  for (std::size_t i = 0; i < std::min(found.size(), most_candidates); ++i)
+    if (auto fit = settle(data, freedom, found[i])) fits.push_back(std::move(*fit));
+  std::mt19937_64 random(1);
+  for (int subset = 0; subset < random_subsets; ++subset)
+    if (const auto candidate = from_random_subset(data, freedom, random))
+      if (auto fit = settle(data, freedom, *candidate)) fits.push_back(std::move(*fit));
+  return least_penalised(fits, data, freedom);
 }
 
 }  // namespace sinerig::identify

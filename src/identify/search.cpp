@@ -17,6 +17,7 @@ constexpr int most_linear_iterations = 12;
 // Phase at the top frequency between two delays of the profile. Refinement with the delay free
 // comes home from about 1 rad away.
 constexpr double profile_step_rad = 0.5;
+constexpr double near_window_rad = 1.5;
 constexpr int most_profile_points = 200;
 // Starts that must end in the same minimum before it counts as the global one without noise to
 // judge by.
@@ -85,13 +86,20 @@ class Contest {
   int agreeing_ = 0;
 };
 
-std::vector<double> profile_delays(const FitData& data, const Freedom& freedom) {
+std::vector<double> profile_delays(const FitData& data, const Freedom& freedom,
+                                   std::optional<double> near_delay_s) {
   const double top = data.omega[data.points() - 1];
-  const double span = freedom.largest_delay_s - freedom.least_delay_s;
+  double first = freedom.least_delay_s;
+  double last = freedom.largest_delay_s;
+  if (near_delay_s) {
+    first = std::clamp(*near_delay_s - near_window_rad / top, first, last);
+    last = std::clamp(*near_delay_s + near_window_rad / top, first, last);
+  }
+  const double span = last - first;
   const int steps = std::clamp(static_cast<int>(std::ceil(span * top / profile_step_rad)), 1,
                                most_profile_points);
   std::vector<double> delays;
-  for (int i = 0; i <= steps; ++i) delays.push_back(freedom.least_delay_s + span * i / steps);
+  for (int i = 0; i <= steps; ++i) delays.push_back(first + span * i / steps);
   return delays;
 }
 
@@ -149,7 +157,7 @@ void contest_pruned(const FitData& data, const Freedom& freedom, const SearchSet
 
 void contest_delays(const FitData& data, const Freedom& freedom, const std::vector<ArrayXd>& starts,
                     const SearchSettings& settings, Contest& contest) {
-  const std::vector<double> delays = profile_delays(data, freedom);
+  const std::vector<double> delays = profile_delays(data, freedom, settings.near_delay_s);
   for (const bool rising : {true, false}) {
     auto profile = followed_profile(data, freedom, delays, starts[0], rising);
     enter_best(profile, settings.effort == Effort::quick ? 2 : 3, most_agreement, contest);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "identify/fit_data.h"
@@ -16,7 +17,8 @@ struct SearchSettings {
   Effort effort = Effort::thorough;
   int random_starts = 10;
   std::uint64_t seed = 1;
-  std::vector<GridRational> warm;  // known good solutions: a lower order, no delay, a neighbour
+  std::optional<double> near_delay_s;  // profile only about 1.5 rad around this delay
+  std::vector<GridRational> warm;      // known good solutions: a lower order, no delay, a neighbour
 };
 
 // True when the cost is what noise alone leaves: χ² within `width` standard deviations of its mean

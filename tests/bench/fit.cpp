@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
   const std::vector<std::pair<std::string, std::function<void(FitBench&)>>> sections{
       {"likelihood", bench_likelihood},
       {"intervals", bench_intervals},
+      {"order", bench_order},
       {"hold", bench_hold},
       {"speed", bench_speed}};
   for (const auto& [name, run] : sections)
