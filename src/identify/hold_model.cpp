@@ -15,8 +15,8 @@ ZerosPolesGain compose(const OrthonormalBasis& N_basis, const Eigen::VectorXd& n
   for (const auto root : D_basis.roots(d)) zpk.poles.push_back(root * scale);
   const int m = N_basis.degree();
   const int poles = D_basis.degree();
-  const double n_leading = n[m];
-  const double d_leading = d[poles];
+  const double n_leading = OrthonormalBasis::significant_leading(n);
+  const double d_leading = OrthonormalBasis::significant_leading(d);
   const double log_gain = std::log(std::abs(n_leading)) + N_basis.log_leading(m) -
                           std::log(std::abs(d_leading)) - D_basis.log_leading(poles) +
                           (poles - m) * std::log(scale);

@@ -97,23 +97,29 @@ Eigen::MatrixXd OrthonormalBasis::power_coefficients() const {
   return powers;
 }
 
+double OrthonormalBasis::significant_leading(const Eigen::VectorXd& coefficients) {
+  const double leading = coefficients[coefficients.size() - 1];
+  const double smallest = coefficients.cwiseAbs().maxCoeff() * 1e-15;
+  return std::copysign(std::max(std::abs(leading), smallest), leading);
+}
+
 std::vector<Complex> OrthonormalBasis::roots(const Eigen::VectorXd& coefficients) const {
   const Index n = coefficients.size() - 1;
   std::vector<Complex> found;
   if (n < 1) return found;
-  double leading = coefficients[n];
-  const double smallest = coefficients.cwiseAbs().maxCoeff() * 1e-200;
-  if (std::abs(leading) < smallest) leading = smallest;
+  const double leading = significant_leading(coefficients);
   Eigen::MatrixXd comrade = hessenberg_.topLeftCorner(n, n);
   comrade.col(n - 1) -= coefficients.head(n) * (hessenberg_(n, n - 1) / leading);
   if (!comrade.allFinite())
     return std::vector<Complex>(static_cast<std::size_t>(n), Complex{1e300});
   const Eigen::VectorXcd eigenvalues = comrade.eigenvalues();
+  Eigen::VectorXd c = coefficients;
+  c[n] = leading;
   for (Complex root : eigenvalues) {
-    Value here = at(coefficients, root);
+    Value here = at(c, root);
     for (int step = 0; step < 5 && here.value != 0.0; ++step) {
       const Complex next = root - here.value / here.derivative;
-      const Value there = at(coefficients, next);
+      const Value there = at(c, next);
       if (!(std::abs(there.value) < std::abs(here.value))) break;
       root = next;
       here = there;

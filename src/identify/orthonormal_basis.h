@@ -41,8 +41,12 @@ class OrthonormalBasis {
   // Natural logarithm of the leading coefficient of P_k, which is positive.
   double log_leading(int k) const { return log_leading_[k]; }
 
+  // The last coefficient, lifted to 1e-15 of the largest: below that it is rounding and would put a
+  // root beyond the range of doubles.
+  static double significant_leading(const Eigen::VectorXd& coefficients);
+
   // Roots of Σ coefficients_k P_k in scaled s: eigenvalues of the comrade matrix, each polished by
-  // Newton steps in the basis. A leading coefficient of zero gives roots near infinity.
+  // Newton steps in the basis. Uses significant_leading.
   std::vector<std::complex<double>> roots(const Eigen::VectorXd& coefficients) const;
 
  private:

@@ -39,12 +39,16 @@ int main(int argc, char** argv) {
   }
   std::printf("fit: seed %llu, runs %d\n", static_cast<unsigned long long>(bench.seed), bench.runs);
   const std::vector<std::pair<std::string, std::function<void(FitBench&)>>> sections{
+      {"paper", bench_paper},
       {"likelihood", bench_likelihood},
       {"intervals", bench_intervals},
       {"order", bench_order},
       {"hold", bench_hold},
-      {"speed", bench_speed}};
+      {"speed", bench_speed},
+      {"degenerate", bench_degenerate}};
   for (const auto& [name, run] : sections)
     if (only.empty() || only == name) run(bench);
+  if (!motor.empty()) bench_real(bench, motor, 4, 2, 476.0);
+  if (!load.empty()) bench_real(bench, load, 4, 0, 132.0);
   return bench.table.finish() == 0 ? 0 : 1;
 }
