@@ -166,6 +166,7 @@ int fit_command(const FitCommandOptions& options) {
   report::FitReport report;
   report.method = options.method;
   report.response = measured.response;
+  report.hold_period_s = measured.hold_period_s;
   report.label = first.label;
   for (std::size_t i = 1; i < measured.inputs.size(); ++i)
     report.label += " and " + measured.inputs[i].label;
@@ -181,11 +182,7 @@ int fit_command(const FitCommandOptions& options) {
   else
     report::print_fit(std::cout, report);
   if (measured.inputs.size() == 1 && first.sweep_file && !options.no_store) {
-    record::store_fit(options.files.front(), {.created_utc = "",
-                                              .input = first.input,
-                                              .output = first.output,
-                                              .method = options.method,
-                                              .json = json});
+    record::store_fit(options.files.front(), first.input, first.output, options.method, json);
     spdlog::info("stored the fit in {}", options.files.front());
   }
   if (report.fit && !report.fit->converged) {

@@ -77,12 +77,15 @@ Json estimate_json(const identify::Estimate& estimate) {
 
 Json roots_json(const std::vector<identify::RootEstimate>& roots) {
   Json list = Json::array();
+  for (const auto& root : roots) list.push_back(pair_json(root.root));
+  return list;
+}
+
+// Per root: variance of the real part, covariance, variance of the imaginary part.
+Json roots_covariance_json(const std::vector<identify::RootEstimate>& roots) {
+  Json list = Json::array();
   for (const auto& root : roots)
-    list.push_back({{"re", root.root.real()},
-                    {"im", root.root.imag()},
-                    {"var_re", root.variance_re},
-                    {"cov_re_im", root.covariance},
-                    {"var_im", root.variance_im}});
+    list.push_back(Json::array({root.variance_re, root.covariance, root.variance_im}));
   return list;
 }
 
@@ -106,6 +109,8 @@ void add_fit(Json& json, const FitReport& report) {
   json["gain"] = fit.zpk.gain;
   json["poles"] = roots_json(fit.poles);
   json["zeros"] = roots_json(fit.zeros);
+  json["poles_covariance"] = roots_covariance_json(fit.poles);
+  json["zeros_covariance"] = roots_covariance_json(fit.zeros);
   json["modes"] = modes_json(fit);
   json["chi2_interval"] = Json::array({fit.chi2_low, fit.chi2_high});
   json["degrees_of_freedom"] = fit.degrees_of_freedom;
