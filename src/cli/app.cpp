@@ -6,6 +6,8 @@
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "cli/fit_command.h"
+#include "cli/fit_input.h"
 #include "config/section.h"
 #include "record/database.h"
 #include "version.h"
@@ -22,11 +24,53 @@ constexpr const char* description =
     "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
-    "  sinerig export gimbal.sweep --format csv -o gimbal.csv";
+    "  sinerig export gimbal.sweep --format csv -o gimbal.csv\n"
+    "  sinerig fit gimbal.sweep            a transfer function with delay and error bars";
 
 constexpr const char* footer =
     "Exit codes: 0 done, 1 failed, 2 usage or configuration, 3 stopped by a limit or a fault,\n"
     "4 interrupted. Every key of a rig file is explained in the files of config/.";
+
+CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
+  CLI::App* fit = app.add_subcommand(
+      "fit",
+      "Identify a transfer function with delay from sweep files or CSV (freq_hz,re,im[,std])");
+  fit->add_option("FILE", options.files, "sweep or CSV files; several are fitted jointly")
+      ->required();
+  fit->add_option("--method", options.method,
+                  "ml: maximum likelihood; hassul, choe: the methods of the papers")
+      ->check(CLI::IsMember({"ml", "hassul", "choe"}))
+      ->capture_default_str();
+  fit->add_option("--zeros", options.zeros, "zeros, those at the origin included");
+  fit->add_option("--poles", options.poles, "poles, those at the origin included");
+  fit->add_option("--origin", options.origin, "poles at the origin; negative: zeros there");
+  fit->add_option("--order", options.order,
+                  "auto: choose the parts of the order that are not given (default without them)")
+      ->check(CLI::IsMember({"auto"}));
+  fit->add_option("--delay", options.delay, "none, fit, or a known delay in seconds")
+      ->capture_default_str();
+  fit->add_option("--hold", options.hold,
+                  "zero-order hold that drove the plant: auto (the loop of a sweep file), none, or "
+                  "its rate in Hz")
+      ->capture_default_str();
+  fit->add_option("--path-delay", options.path_delay_s,
+                  "delay of the measuring path in seconds, not part of the model");
+  fit->add_option("--static-gain", options.static_gain, "known gain of s^origin G(s) at s = 0");
+  fit->add_option("--given-pole", options.given_poles_rad_s, "a known real pole in rad/s");
+  fit->add_option("--model-error", options.model_error,
+                  "relative error of the model itself, added to the scatter (default: 0 for CSV, "
+                  "0.002 for sweep files)");
+  fit->add_option("--weights", options.weights, "hassul: none, 1/w, or W1,W2,... one per point")
+      ->capture_default_str();
+  fit->add_option("--bands", options.bands, "choe: number of sub-bands")->capture_default_str();
+  fit->add_flag("--stable", options.stable, "keep poles in the left half plane");
+  fit->add_flag("--minimum-phase", options.minimum_phase, "keep zeros in the left half plane");
+  fit->add_flag("--keep-outliers", options.keep_outliers, "never leave a point out");
+  fit->add_option("--channel", options.channel, "sensor of a sweep file (default: the first)");
+  fit->add_flag("--json", options.json, "print one JSON object");
+  fit->add_flag("--no-store", options.no_store, "do not store the fit in the sweep file");
+  return fit;
+}
 
 void set_up_logging(const std::string& level) {
   spdlog::set_default_logger(spdlog::stderr_color_mt("sinerig"));
@@ -97,6 +141,9 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   reporter->add_flag("--force", report_options.force,
                      "replace the file if it exists (a report is replaced anyway)");
 
+  FitCommandOptions fit_options;
+  CLI::App* fit = add_fit(app, fit_options);
+
   CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
 
   try {
@@ -113,11 +160,18 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     if (show->parsed()) return show_command(file);
     if (exporter->parsed()) return export_command(export_options);
     if (reporter->parsed()) return report_command(report_options);
+    if (fit->parsed()) return fit_command(fit_options);
     if (list->parsed()) return drivers_command(drivers);
   } catch (const config::ConfigError& error) {
     spdlog::error("{}", error.what());
     return exit_usage;
   } catch (const record::FileExists& error) {
+    spdlog::error("{}", error.what());
+    return exit_usage;
+  } catch (const InputError& error) {
+    spdlog::error("{}", error.what());
+    return exit_usage;
+  } catch (const std::invalid_argument& error) {
     spdlog::error("{}", error.what());
     return exit_usage;
   } catch (const std::exception& error) {
