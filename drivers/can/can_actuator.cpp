@@ -48,8 +48,8 @@ Sample CanActuator::write(double command) noexcept {
   released_ = false;
   // A command that is no number must not leave the last one standing: neutral goes out instead.
   compose(std::isfinite(command) ? command : settings_.neutral);
-  last_result_ = bus_.send(frame_);
   const std::int64_t now_ns = monotonic_ns();
+  last_result_ = bus_.send(frame_);
   if (last_result_ == SendResult::sent) {
     held_.value = encoded_;
     held_.time_ns = now_ns;
