@@ -57,9 +57,10 @@ need() {
       "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get -o DPkg::Lock::Timeout=300 install \
         --yes -q --no-install-recommends "${missing[@]}"
   } </dev/null >"$log" 2>&1; then
-    tail -n 20 "$log" >&2
+    { grep -E '^[EW]:' "$log" || cat "$log"; } | tail -n 5 >&2
     rm -f "$log"
-    echo "The packages could not be installed (above: the end of what apt said)." >&2
+    echo "apt could not install the packages (above: the end of what it said). Is there a network, and" >&2
+    echo "is this Debian 12 or later? Once that is mended, call again." >&2
     exit 1
   fi
   rm -f "$log"

@@ -92,14 +92,14 @@ void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double
 std::uint32_t part_count(std::uint64_t block_samples) {
   constexpr std::uint64_t shortest_part = 16;
   std::uint32_t parts = 1;
-  while (parts < 8 && block_samples / (2 * parts) >= shortest_part) parts *= 2;
+  while (parts < 8 && block_samples / 2 / parts >= shortest_part) parts *= 2;
   return parts;
 }
 
 // Harmonics that stay below half the rate and apart from their images.
 std::uint32_t harmonic_count(std::uint32_t wanted, const CoherentFrequency& base) {
   std::uint32_t highest = 1;
-  while (highest < wanted && 2 * (highest + 1) * base.cycles < base.samples) ++highest;
+  while (highest < wanted && 2 * base.cycles * (highest + 1) < base.samples) ++highest;
   return highest;
 }
 

@@ -4,31 +4,32 @@
 
 #if defined(__has_feature)
 #if __has_feature(realtime_sanitizer)
-#define SINERIG_UNDER_RTSAN 1
-#endif
-#endif
-
-#ifdef SINERIG_UNDER_RTSAN
+#define SINERIG_UNDER_RTSAN
 #include <sanitizer/rtsan_interface.h>
+#endif
 #endif
 
 namespace sinerig::test {
 
 class OutsideTheLoop {
  public:
+  OutsideTheLoop() noexcept { look_away(); }
+  ~OutsideTheLoop() { look_again(); }
+  OutsideTheLoop(const OutsideTheLoop&) = delete;
+  OutsideTheLoop& operator=(const OutsideTheLoop&) = delete;
+
+ private:
 #ifdef SINERIG_UNDER_RTSAN
-  OutsideTheLoop() noexcept {
+  static void look_away() noexcept {
     __rtsan_disable();
   }
-  ~OutsideTheLoop() {
+  static void look_again() noexcept {
     __rtsan_enable();
   }
 #else
-  OutsideTheLoop() noexcept {}
-  ~OutsideTheLoop() {}
+  static void look_away() noexcept {}
+  static void look_again() noexcept {}
 #endif
-  OutsideTheLoop(const OutsideTheLoop&) = delete;
-  OutsideTheLoop& operator=(const OutsideTheLoop&) = delete;
 };
 
 }  // namespace sinerig::test
