@@ -26,10 +26,16 @@ constexpr const char* description =
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
     "  sinerig export gimbal.sweep --format csv -o gimbal.csv\n"
     "  sinerig fit gimbal.sweep            a transfer function with delay and error bars";
+    "  sinerig export gimbal.sweep --format mat -o gimbal.mat\n"
+    "  sinerig compare monday.sweep today.sweep";
 
 constexpr const char* footer =
     "Exit codes: 0 done, 1 failed, 2 usage or configuration, 3 stopped by a limit or a fault,\n"
-    "4 interrupted. Every key of a rig file is explained in the files of config/.";
+    "4 interrupted, 5 compare found a change. Every key of a rig file is explained in the files of "
+    "config/.";
+
+constexpr const char* measured_file =
+    "sweep file, or a response measured elsewhere: .csv, .txt, .mat, .uff or .unv";
 
 CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
   CLI::App* fit = app.add_subcommand(
@@ -113,22 +119,27 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
 
   CLI::App* show =
       app.add_subcommand("show", "Print a sweep file: how the run went and its points");
-  show->add_option("FILE", file, "sweep file")->required();
+  show->add_option("FILE", file, measured_file)->required();
 
-  CLI::App* exporter = app.add_subcommand("export", "Write a sweep file's response as CSV or JSON");
-  exporter->add_option("FILE", export_options.file, "sweep file")->required();
-  exporter->add_option("--format", export_options.format, "csv or json")
-      ->check(CLI::IsMember({"csv", "json"}))
+  CLI::App* exporter = app.add_subcommand(
+      "export", "Write responses for other programs: CSV, JSON, MATLAB, UFF 58, source text");
+  exporter->add_option("FILE", export_options.file, measured_file)->required();
+  exporter
+      ->add_option("--format", export_options.format,
+                   "csv; json; mat: MATLAB 5, the fields of frd and idfrd; uff: dataset 58; "
+                   "snippet: Python source, or MATLAB's with -o NAME.m")
+      ->check(CLI::IsMember({"csv", "json", "mat", "uff", "snippet"}))
       ->capture_default_str();
   exporter->add_option("-o,--output", export_options.output,
                        "file to write (default: standard output)");
-  exporter->add_option("--channel", export_options.channel,
-                       "sensor whose response the CSV holds (default: the first)");
+  exporter->add_option(
+      "--channel", export_options.channel,
+      "sensor whose response is written (default: the first; all in json, mat and uff)");
   exporter->add_flag("--force", export_options.force, "replace the file if it exists");
 
   CLI::App* reporter = app.add_subcommand(
       "report", "Write a sweep file's report: one HTML page for any browser, or a picture");
-  reporter->add_option("FILE", report_options.file, "sweep file")->required();
+  reporter->add_option("FILE", report_options.file, measured_file)->required();
   reporter
       ->add_option("--format", report_options.format,
                    "html: the interactive page; svg or png: the Bode plot of one response")
@@ -143,6 +154,30 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
 
   FitCommandOptions fit_options;
   CLI::App* fit = add_fit(app, fit_options);
+  CompareOptions compare_options;
+  CLI::App* comparer = app.add_subcommand(
+      "compare", "Tell whether measurements differ by more than their scatter explains");
+  comparer->add_option("FILES", compare_options.files, "files; the first is the reference")
+      ->required()
+      ->expected(2, -1);
+  comparer
+      ->add_option("--tolerance-db", compare_options.settings.tolerance_db,
+                   "changes of the gain up to this are none, dB")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  comparer
+      ->add_option("--tolerance-deg", compare_options.settings.tolerance_deg,
+                   "changes of the phase up to this are none, degrees")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  comparer
+      ->add_option("--false-alarm", compare_options.settings.false_alarm,
+                   "chance to call two equal responses different")
+      ->check(CLI::Range(1e-12, 0.5))
+      ->capture_default_str();
+  comparer->add_option("-o,--output", compare_options.output,
+                       "page that lays them over each other");
+  comparer->add_flag("--force", compare_options.force, "replace the page if it exists");
 
   CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
 
@@ -161,6 +196,7 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     if (exporter->parsed()) return export_command(export_options);
     if (reporter->parsed()) return report_command(report_options);
     if (fit->parsed()) return fit_command(fit_options);
+    if (comparer->parsed()) return compare_command(compare_options);
     if (list->parsed()) return drivers_command(drivers);
   } catch (const config::ConfigError& error) {
     spdlog::error("{}", error.what());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "drivers/device.h"
+#include "record/compare.h"
 
 namespace sinerig::cli {
 
@@ -14,6 +15,7 @@ enum ExitCode : int {
   exit_usage = 2,        // usage or configuration
   exit_stopped = 3,      // by a limit or a fault
   exit_interrupted = 4,  // by the user; resumable
+  exit_changed = 5,      // compare: at least one point differs
 };
 
 struct RunOptions {
@@ -27,7 +29,7 @@ struct ExportOptions {
   std::string file;
   std::string format = "csv";
   std::string output;   // empty: standard output
-  std::string channel;  // of the CSV; empty: the first sensor
+  std::string channel;  // empty: the first sensor, or all where the format holds several
   bool force = false;
 };
 
@@ -39,11 +41,19 @@ struct ReportOptions {
   bool force = false;
 };
 
+struct CompareOptions {
+  std::vector<std::string> files;  // the first is what the others are compared with
+  record::CompareSettings settings;
+  std::string output;  // overlay as a page; empty: none
+  bool force = false;
+};
+
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
 int plan_command(const std::string& rig, const std::vector<DriverKit>& drivers);
 int show_command(const std::string& file);
 int export_command(const ExportOptions& options);
 int report_command(const ReportOptions& options);
+int compare_command(const CompareOptions& options);
 int drivers_command(const std::vector<DriverKit>& drivers);
 
 }  // namespace sinerig::cli

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/output_file.h"
 #include "cli/report_file.h"
+#include "record/measured.h"
 #include "report/figure.h"
 #include "report/raster.h"
 
@@ -30,7 +31,7 @@ int report_command(const ReportOptions& options) {
   }
   if (options.format == "png" && !report::has_raster()) report::png_from_svg("", png_scale);
   const report::LabelledRun run{.label = fs::path{options.file}.stem().string(),
-                                .run = record::read_sweep(options.file)};
+                                .run = record::read_measured(options.file)};
   const std::string path =
       options.output.empty()
           ? fs::path{options.file}.replace_extension("." + options.format).string()

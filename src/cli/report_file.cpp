@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "cli/output_file.h"
+#include "record/measured.h"
 #include "report/html.h"
 
 namespace sinerig::cli {
@@ -24,7 +25,7 @@ bool is_report(const std::string& path) {
 
 void write_report(const std::string& sweep_file, const std::string& path, bool force) {
   const report::LabelledRun run{.label = fs::path{sweep_file}.stem().string(),
-                                .run = record::read_sweep(sweep_file)};
+                                .run = record::read_measured(sweep_file)};
   write_file(path, force || is_report(path),
              [&](std::ostream& stream) { report::write_html(stream, run); });
 }

@@ -6,6 +6,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "record/point_columns.h"
+
 namespace sinerig::record {
 
 namespace {
@@ -19,7 +21,7 @@ double gain_db(std::complex<double> response) {
 }
 
 std::string field(double value) {
-  if (!std::isfinite(value)) return {};
+  if (std::isnan(value)) return {};
   char text[40];
   std::snprintf(text, sizeof text, "%.17g", value);
   return text;
@@ -114,23 +116,25 @@ Json timing_json(const StoredRun& run) {
 }  // namespace
 
 void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response) {
-  stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im,dof,gain_interval_db,"
-            "phase_interval_deg,input_amplitude,output_amplitude,snr_db,distortion,drift_per_s,"
-            "samples,"
-            "lost,seconds,status,reason,reason_value,input,output\n";
+  const ChannelInfo& input = run.channels.at(response.input);
+  const ChannelInfo& output = run.channels.at(response.output);
+  stream << "# output: " << output.name << " [" << output.unit << "]\n# input: " << input.name
+         << " [" << input.unit << "]\n# " << response_convention
+         << "\n# re, im, var_*: in output per input; frequencies in Hz; half widths are 95 %\n"
+         << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im";
+  for (const PointColumn& column : point_columns) stream << ',' << column.name;
+  stream << ",status,reason,input,output\n";
   const std::vector<double> phase = unwrapped_phase(response.points);
   for (std::size_t i = 0; i < response.points.size(); ++i) {
     const StoredPoint& point = response.points[i];
     for (const double value :
          {point.frequency_hz, point.response.real(), point.response.imag(), gain_db(point.response),
           phase[i] * degrees_per_radian, point.covariance.re_re, point.covariance.re_im,
-          point.covariance.im_im, point.dof, point.gain_interval_db, point.phase_interval_deg,
-          point.input_amplitude, point.output_amplitude, point.snr_db, point.distortion,
-          point.drift_per_s, point.samples, point.lost, point.seconds}) {
+          point.covariance.im_im}) {
       stream << field(value) << ',';
     }
-    stream << point.status << ',' << point.reason << ',' << field(point.reason_value) << ','
-           << run.channels.at(point.input).name << ',' << run.channels.at(point.output).name
+    for (const PointColumn& column : point_columns) stream << field(point.*column.value) << ',';
+    stream << point.status << ',' << point.reason << ',' << input.name << ',' << output.name
            << '\n';
   }
 }
@@ -151,7 +155,7 @@ void write_json(std::ostream& stream, const StoredRun& run) {
   const Json document = {{"format", "sinerig-sweep"},
                          {"format_version", 1},
                          {"rate_hz", run.plan.rate_hz},
-                         {"convention", "H = Y/U, Y = b1 + j a1, y ~ a0 + a1 cos wt + b1 sin wt"},
+                         {"convention", response_convention},
                          {"rig", {{"name", run.fact("rig_name")}, {"text", run.fact("rig_text")}}},
                          {"run", facts},
                          {"channels", channels},

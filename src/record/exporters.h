@@ -8,8 +8,9 @@
 
 namespace sinerig::record {
 
-// freq_hz,re,im,gain_db,phase_deg (phase unwrapped), then covariance, intervals, amplitudes,
-// quality, status. One response, rising frequency; numbers round-trip, NaN is an empty field.
+// Remarks with channels, units and sign convention behind #, then the columns
+// freq_hz,re,im,gain_db, phase_deg (phase unwrapped), covariance, figures of point_columns.h,
+// status. One response, rising frequency; numbers round-trip, NaN is an empty field.
 void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response);
 
 // Everything but blocks and samples: facts, rig file, loop rate, plan, responses, events, timing.

@@ -97,7 +97,14 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
   stream << plan.dwells.size() << " points, " << bench_time_text(plan) << " of bench time\n";
 }
 
-void print_run(std::ostream& stream, const record::StoredRun& run) {
+namespace {
+
+// Which run it is and how it went.
+void print_head(std::ostream& stream, const record::StoredRun& run) {
+  if (!run.fact("imported_from").empty()) {
+    stream << "imported from " << run.fact("imported_from") << '\n';
+    return;
+  }
   stream << text("rig      %s, %g Hz, %s clock\n", run.fact("rig_name").c_str(), run.plan.rate_hz,
                  run.fact("clock").c_str());
   stream << text("run      %s on %s, sinerig %s\n", run.fact("started_utc").c_str(),
@@ -117,6 +124,12 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
   stream << text("loop     %llu ticks, %llu skipped, %.1f µs late at most\n",
                  static_cast<unsigned long long>(ticks), static_cast<unsigned long long>(skipped),
                  static_cast<double>(max_lateness_ns) * 1e-3);
+}
+
+}  // namespace
+
+void print_run(std::ostream& stream, const record::StoredRun& run) {
+  print_head(stream, run);
   for (const record::StoredResponse& response : run.responses) {
     const record::ChannelInfo& input = run.channels.at(response.input);
     const record::ChannelInfo& output = run.channels.at(response.output);

@@ -1,0 +1,154 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "record/mat_file.h"
+#include "record/mat_value.h"
+#include "record/point_columns.h"
+#include "version.h"
+
+namespace sinerig::record {
+
+namespace {
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+
+// The channels on one side of the responses, each once, in the order of their first appearance.
+std::vector<std::uint32_t> distinct(const std::vector<const StoredResponse*>& responses,
+                                    std::uint32_t StoredResponse::*side) {
+  std::vector<std::uint32_t> channels;
+  for (const StoredResponse* each : responses) {
+    if (std::find(channels.begin(), channels.end(), each->*side) == channels.end())
+      channels.push_back(each->*side);
+  }
+  return channels;
+}
+
+// Responses as the ny×nu×nf arrays of MATLAB, the first index running fastest.
+class Grid {
+ public:
+  explicit Grid(const std::vector<const StoredResponse*>& responses)
+      : outputs_{distinct(responses, &StoredResponse::output)},
+        inputs_{distinct(responses, &StoredResponse::input)},
+        length_{responses.front()->points.size()},
+        points_(outputs_.size() * inputs_.size() * length_, nullptr) {
+    for (const StoredResponse* response : responses) {
+      const std::size_t row = place(outputs_, response->output);
+      const std::size_t column = place(inputs_, response->input);
+      for (std::size_t k = 0; k < length_; ++k)
+        points_[(k * inputs_.size() + column) * outputs_.size() + row] = &response->points[k];
+    }
+  }
+
+  const std::vector<std::uint32_t>& outputs() const { return outputs_; }
+  const std::vector<std::uint32_t>& inputs() const { return inputs_; }
+  Dimensions dimensions() const { return {outputs_.size(), inputs_.size(), length_}; }
+  const std::vector<const StoredPoint*>& points() const { return points_; }
+
+  template <typename Value>
+  std::vector<double> numbers(Value value) const {
+    std::vector<double> all;
+    for (const StoredPoint* point : points_)
+      all.push_back(point == nullptr ? nan_value : value(*point));
+    return all;
+  }
+
+  std::vector<std::string> texts(std::string StoredPoint::*text) const {
+    std::vector<std::string> all;
+    for (const StoredPoint* point : points_)
+      all.push_back(point == nullptr ? std::string{} : point->*text);
+    return all;
+  }
+
+ private:
+  static std::size_t place(const std::vector<std::uint32_t>& channels, std::uint32_t channel) {
+    return static_cast<std::size_t>(std::find(channels.begin(), channels.end(), channel) -
+                                    channels.begin());
+  }
+
+  std::vector<std::uint32_t> outputs_;
+  std::vector<std::uint32_t> inputs_;
+  std::size_t length_;
+  std::vector<const StoredPoint*> points_;
+};
+
+void refuse_different_grids(const std::string& path,
+                            const std::vector<const StoredResponse*>& responses) {
+  const auto same = [&](const StoredResponse* each) {
+    return std::equal(each->points.begin(), each->points.end(), responses.front()->points.begin(),
+                      responses.front()->points.end(), [](const auto& a, const auto& b) {
+                        return a.frequency_hz == b.frequency_hz;
+                      });
+  };
+  if (std::all_of(responses.begin(), responses.end(), same)) return;
+  throw SweepFileError(path +
+                       ": the responses do not share their frequencies, one MATLAB array cannot "
+                       "hold them; export them one by one with --channel");
+}
+
+void write_channels(mat_t* file, const StoredRun& run, const Grid& grid) {
+  const auto write = [&](const char* name, const std::vector<std::uint32_t>& channels,
+                         std::string ChannelInfo::*part) {
+    std::vector<std::string> texts;
+    for (const std::uint32_t channel : channels) texts.push_back(run.channels.at(channel).*part);
+    Mat_VarWrite(file, mat_texts(name, {channels.size(), 1}, texts).get(), MAT_COMPRESSION_NONE);
+  };
+  write("OutputName", grid.outputs(), &ChannelInfo::name);
+  write("OutputUnit", grid.outputs(), &ChannelInfo::unit);
+  write("InputName", grid.inputs(), &ChannelInfo::name);
+  write("InputUnit", grid.inputs(), &ChannelInfo::unit);
+}
+
+std::vector<double> covariance_data(const Grid& grid) {
+  std::vector<double> all;
+  for (const double Covariance2::*part :
+       {&Covariance2::re_re, &Covariance2::re_im, &Covariance2::re_im, &Covariance2::im_im}) {
+    const std::vector<double> values =
+        grid.numbers([&](const StoredPoint& point) { return point.covariance.*part; });
+    all.insert(all.end(), values.begin(), values.end());
+  }
+  return all;
+}
+
+}  // namespace
+
+void write_mat(const std::string& path, const StoredRun& run,
+               const std::vector<const StoredResponse*>& responses) {
+  refuse_different_grids(path, responses);
+  const Grid grid{responses};
+  const std::string remark = std::string{"MATLAB 5.0 MAT-file, sinerig "} + version;
+  const MatFile file{Mat_CreateVer(path.c_str(), remark.c_str(), MAT_FT_MAT5)};
+  if (file == nullptr) throw SweepFileError(path + ": cannot be written");
+  bool written = true;
+  const auto write = [&](const MatValue& value) {
+    written = written && value != nullptr &&
+              Mat_VarWrite(file.get(), value.get(), MAT_COMPRESSION_NONE) == 0;
+  };
+
+  std::vector<std::complex<double>> response;
+  for (const StoredPoint* point : grid.points())
+    response.push_back(point == nullptr ? std::complex<double>{nan_value, nan_value}
+                                        : point->response);
+  std::vector<double> frequency;
+  for (const StoredPoint& point : responses.front()->points)
+    frequency.push_back(point.frequency_hz);
+  Dimensions with_covariance = grid.dimensions();
+  with_covariance.insert(with_covariance.end(), {2, 2});
+
+  write(mat_array("ResponseData", grid.dimensions(), response));
+  write(mat_array("Frequency", {frequency.size(), 1}, frequency));
+  write(mat_text("FrequencyUnit", "Hz"));
+  write(mat_array("CovarianceData", with_covariance, covariance_data(grid)));
+  write(mat_array("Ts", {1, 1}, std::vector<double>{0.0}));
+  write_channels(file.get(), run, grid);
+  for (const PointColumn& column : point_columns) {
+    write(mat_array(column.name, grid.dimensions(),
+                    grid.numbers([&](const StoredPoint& point) { return point.*column.value; })));
+  }
+  write(mat_texts("status", grid.dimensions(), grid.texts(&StoredPoint::status)));
+  write(mat_texts("reason", grid.dimensions(), grid.texts(&StoredPoint::reason)));
+  write(mat_text("Notes", response_convention));
+  if (!written) throw SweepFileError(path + ": cannot be written");
+}
+
+}  // namespace sinerig::record

@@ -1,0 +1,107 @@
+#include "record/measured.h"
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <limits>
+
+#include "record/csv_reader.h"
+#include "record/mat_file.h"
+#include "record/uff58.h"
+
+namespace sinerig::record {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+
+std::string extension_of(const std::string& path) {
+  std::string extension = fs::path{path}.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char each) { return static_cast<char>(std::tolower(each)); });
+  return extension;
+}
+
+bool is_foreign(const std::string& extension) {
+  constexpr const char* known[] = {".csv", ".txt", ".mat", ".uff", ".unv"};
+  return std::find(std::begin(known), std::end(known), extension) != std::end(known);
+}
+
+// The index of a channel of this name and unit, added where it is new.
+std::uint32_t channel_index(std::vector<ChannelInfo>& channels, const ChannelInfo& wanted) {
+  const auto found = std::find_if(channels.begin() + 2, channels.end(), [&](const auto& each) {
+    return each.name == wanted.name && each.unit == wanted.unit;
+  });
+  if (found != channels.end()) return static_cast<std::uint32_t>(found - channels.begin());
+  channels.push_back(wanted);
+  return static_cast<std::uint32_t>(channels.size() - 1);
+}
+
+}  // namespace
+
+StoredPoint imported_point() {
+  StoredPoint point;
+  point.frequency_hz = nan_value;
+  point.response = {nan_value, nan_value};
+  point.covariance = {nan_value, nan_value, nan_value};
+  for (double StoredPoint::*member :
+       {&StoredPoint::gain_interval_db, &StoredPoint::phase_interval_deg,
+        &StoredPoint::input_amplitude, &StoredPoint::output_amplitude, &StoredPoint::snr_db,
+        &StoredPoint::distortion, &StoredPoint::drift_per_s, &StoredPoint::samples,
+        &StoredPoint::lost, &StoredPoint::seconds, &StoredPoint::reason_value})
+    point.*member = nan_value;
+  point.status = "imported";
+  return point;
+}
+
+std::vector<ImportedResponse> import_responses(const std::string& path) {
+  if (!fs::exists(path)) throw SweepFileError(path + ": does not exist");
+  const std::string extension = extension_of(path);
+  std::vector<ImportedResponse> responses;
+  if (extension == ".csv" || extension == ".txt") {
+    responses = {read_csv(path)};
+  } else if (extension == ".mat") {
+    responses = read_mat(path);
+  } else if (extension == ".uff" || extension == ".unv") {
+    responses = read_uff58(path);
+  } else {
+    throw SweepFileError(path +
+                         ": the format is told by the extension, which has to be .sweep, .csv, "
+                         ".txt, .mat, .uff or .unv");
+  }
+  for (ImportedResponse& response : responses) {
+    std::stable_sort(response.points.begin(), response.points.end(),
+                     [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
+  }
+  return responses;
+}
+
+StoredRun run_of(const std::vector<ImportedResponse>& responses, const std::string& path) {
+  StoredRun run;
+  run.facts["imported_from"] = fs::path{path}.filename().string();
+  run.channels = {{"command", ""}, {"applied", ""}};
+  for (const ImportedResponse& each : responses) {
+    StoredResponse response;
+    const bool applied = each.input.name.empty() || each.input.name == "applied";
+    if (applied) run.channels[1].unit = run.channels[0].unit = each.input.unit;
+    response.input = applied ? 1U : channel_index(run.channels, each.input);
+    response.output = channel_index(run.channels, each.output);
+    response.points = each.points;
+    for (std::size_t i = 0; i < response.points.size(); ++i) {
+      response.points[i].dwell = static_cast<std::uint32_t>(i);
+      response.points[i].input = response.input;
+      response.points[i].output = response.output;
+    }
+    run.responses.push_back(std::move(response));
+  }
+  return run;
+}
+
+StoredRun read_measured(const std::string& path) {
+  if (is_foreign(extension_of(path))) return run_of(import_responses(path), path);
+  return read_sweep(path);
+}
+
+}  // namespace sinerig::record

@@ -1,0 +1,34 @@
+// Responses from whatever file they are in: a sweep file, or CSV, MATLAB and UFF 58 files measured
+// elsewhere.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "record/sweep_reader.h"
+
+namespace sinerig::record {
+
+// A response as another program wrote it. What the file does not say is NaN; points without a
+// status have "imported". Scatter without degrees of freedom counts as exactly known (dof
+// infinite), no scatter as unknown (dof 0).
+struct ImportedResponse {
+  ChannelInfo input;
+  ChannelInfo output;
+  std::vector<StoredPoint> points;  // by rising frequency
+};
+
+// A point with nothing in it yet.
+StoredPoint imported_point();
+
+// By extension: .csv or .txt, .mat, .uff or .unv. Throws SweepFileError naming file, place and
+// rule.
+std::vector<ImportedResponse> import_responses(const std::string& path);
+
+// The same values as a run that has no plan, events or timing.
+StoredRun run_of(const std::vector<ImportedResponse>& responses, const std::string& path);
+
+// Whatever file it is: read_sweep for a sweep file, else run_of(import_responses).
+StoredRun read_measured(const std::string& path);
+
+}  // namespace sinerig::record

@@ -1,0 +1,93 @@
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <ostream>
+
+#include "record/point_columns.h"
+#include "record/uff58.h"
+
+namespace sinerig::record {
+
+namespace {
+
+constexpr std::size_t abscissa_columns = 13;
+
+[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
+  char buffer[128];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(buffer, sizeof buffer, format, arguments);
+  va_end(arguments);
+  return buffer;
+}
+
+// As many digits as fit beside one blank. FORTRAN takes a number with a decimal point as it stands,
+// whatever the digits of the E13.5 that reads it.
+std::string abscissa(double value) {
+  for (int digits = 12; digits > 5; --digits) {
+    const bool plain = value >= 1e-3 && value < 1e7;
+    const int before = plain ? std::max(1, static_cast<int>(std::floor(std::log10(value))) + 1) : 1;
+    const std::string number =
+        plain ? text("%.*f", std::max(1, digits - before), value) : text("%.*E", digits - 1, value);
+    if (number.size() < abscissa_columns)
+      return std::string(abscissa_columns - number.size(), ' ') + number;
+  }
+  return text("%13.5E", value);
+}
+
+// A line of at most 80 columns; an empty one is NONE.
+std::string id_line(const std::string& line) {
+  return (line.empty() ? "NONE" : line.substr(0, 80)) + "\n";
+}
+
+// Specific data type of the format for a unit: displacement 8, velocity 11, acceleration 12,
+// excitation force 13, general 1.
+int data_type(const std::string& unit) {
+  if (unit == "m" || unit == "mm" || unit == "rad" || unit == "deg") return 8;
+  if (unit == "m/s" || unit == "mm/s" || unit == "rad/s" || unit == "deg/s") return 11;
+  if (unit == "m/s²" || unit == "m/s^2" || unit == "rad/s²" || unit == "rad/s^2") return 12;
+  if (unit == "N" || unit == "Nm") return 13;
+  return 1;
+}
+
+std::string axis_line(int type, const std::string& label, const std::string& unit) {
+  return text("%10d%5d%5d%5d %-20.20s %-20.20s\n", type, 0, 0, 0,
+              label.empty() ? "NONE" : label.c_str(), unit.empty() ? "NONE" : unit.c_str());
+}
+
+void write_dataset(std::ostream& stream, const StoredRun& run, const StoredResponse& response,
+                   const std::string& run_name) {
+  const ChannelInfo& input = run.channels.at(response.input);
+  const ChannelInfo& output = run.channels.at(response.output);
+  std::vector<const StoredPoint*> points;
+  for (const StoredPoint& point : response.points)
+    if (std::isfinite(std::abs(point.response))) points.push_back(&point);
+
+  stream << "    -1\n    58\n"
+         << id_line("sinerig " + run_name) << id_line(response_convention)
+         << id_line(run.fact("started_utc"))
+         << id_line("output: " + output.name + " [" + output.unit + "]")
+         << id_line("input: " + input.name + " [" + input.unit + "]")
+         << text("%5d%10d%5d%10d %-10.10s%10d%4d %-10.10s%10d%4d\n", 4, 0, 0, 0,
+                 output.name.c_str(), static_cast<int>(response.output), 0, input.name.c_str(),
+                 static_cast<int>(response.input), 0)
+         << text("%10d%10zu%10d%13.5E%13.5E%13.5E\n", 6, points.size(), 0,
+                 points.empty() ? 0.0 : points.front()->frequency_hz, 0.0, 0.0)
+         << axis_line(18, "Frequency", "Hz")
+         << axis_line(data_type(output.unit), output.name, output.unit)
+         << axis_line(data_type(input.unit), input.name, input.unit) << axis_line(0, "", "");
+  for (const StoredPoint* point : points) {
+    stream << abscissa(point->frequency_hz)
+           << text("%20.12E%20.12E\n", point->response.real(), point->response.imag());
+  }
+  stream << "    -1\n";
+}
+
+}  // namespace
+
+void write_uff58(std::ostream& stream, const StoredRun& run,
+                 const std::vector<const StoredResponse*>& responses, const std::string& run_name) {
+  for (const StoredResponse* response : responses) write_dataset(stream, run, *response, run_name);
+}
+
+}  // namespace sinerig::record

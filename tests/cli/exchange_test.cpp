@@ -1,0 +1,171 @@
+// Other programs get the same H out of what is exported.
+#include <cmath>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "record/sweep_reader.h"
+#include "support/program.h"
+
+namespace sinerig {
+namespace {
+
+using testing::HasSubstr;
+
+class Exchange : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto run = workshop_.sinerig("run " SINERIG_SOURCE_DIR
+                                       "/config/two-mass.toml -o axis.sweep --no-report");
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    run_ = record::read_sweep((workshop_.folder() / "axis.sweep").string());
+  }
+
+  bool here(const std::string& program) const {
+    return workshop_.shell("command -v " + program).exit_code == 0;
+  }
+
+  // Lines "freq_hz re im" against the points of the first response.
+  void expect_response(const std::string& text, double tolerance) const {
+    std::istringstream stream{text};
+    for (const record::StoredPoint& point : run_.responses.front().points) {
+      double frequency_hz = 0.0;
+      double re = 0.0;
+      double im = 0.0;
+      ASSERT_TRUE(stream >> frequency_hz >> re >> im) << text;
+      EXPECT_NEAR(frequency_hz / point.frequency_hz, 1.0, tolerance);
+      EXPECT_LE(std::abs(std::complex<double>{re, im} - point.response),
+                tolerance * std::abs(point.response));
+    }
+  }
+
+  test::Workshop workshop_;
+  record::StoredRun run_;
+};
+
+TEST_F(Exchange, OctaveReadsTheMatlabFile) {
+  if (!here("octave-cli")) GTEST_SKIP() << "no Octave here (Debian: apt install octave)";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep --format mat -o axis.mat").exit_code, 0);
+  workshop_.write("check.m", R"m(
+s = load('axis.mat');
+assert(size(s.ResponseData), [2 1 numel(s.Frequency)]);
+assert(size(s.CovarianceData), [2 1 numel(s.Frequency) 2 2]);
+assert(s.OutputName{2}, 'load');
+assert(s.FrequencyUnit, 'Hz');
+h = squeeze(s.ResponseData(1, 1, :));
+printf('%.17g %.17g %.17g\n', [s.Frequency real(h) imag(h)]');
+)m");
+  const auto octave = workshop_.shell("octave-cli --no-init-file check.m");
+  EXPECT_EQ(octave.exit_code, 0) << octave.errors;
+  expect_response(octave.output, 1e-12);
+}
+
+TEST_F(Exchange, OctaveReadsTheCsv) {
+  if (!here("octave-cli")) GTEST_SKIP() << "no Octave here (Debian: apt install octave)";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep -o axis.csv").exit_code, 0);
+  workshop_.write("check.m", R"m(
+c = textscan(fopen('axis.csv'), '%f %f %f %*[^\n]', 'Delimiter', ',', 'HeaderLines', 5);
+printf('%.17g %.17g %.17g\n', [c{1} c{2} c{3}]');
+)m");
+  const auto octave = workshop_.shell("octave-cli --no-init-file check.m");
+  EXPECT_EQ(octave.exit_code, 0) << octave.errors;
+  expect_response(octave.output, 1e-12);
+}
+
+TEST_F(Exchange, OctaveRunsTheMatlabSnippet) {
+  if (!here("octave-cli")) GTEST_SKIP() << "no Octave here (Debian: apt install octave)";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep --format snippet -o axis.m").exit_code, 0);
+  const auto octave = workshop_.shell(
+      "octave-cli --no-init-file --eval \"axis_file = 'axis.m'; source(axis_file); "
+      "printf('%.17g %.17g %.17g\\n', [freq_hz real(H) imag(H)]');\"");
+  EXPECT_EQ(octave.exit_code, 0) << octave.errors;
+  expect_response(octave.output, 1e-12);
+}
+
+TEST_F(Exchange, PythonRunsTheSnippet) {
+  if (workshop_.shell("/usr/bin/python3 -c 'import scipy'").exit_code != 0)
+    GTEST_SKIP() << "no scipy here (Debian: apt install python3-scipy)";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep --format snippet -o axis.py").exit_code, 0);
+  const auto python = workshop_.shell(
+      "/usr/bin/python3 -c \"from axis import *; [print(repr(f), repr(h.real), repr(h.imag)) "
+      "for f, h in zip(freq_hz.tolist(), H.tolist())]; misfit([1.0], [1.0, 1.0], 0.001)\"");
+  EXPECT_EQ(python.exit_code, 0) << python.errors;
+  expect_response(python.output, 1e-12);
+}
+
+// The fixed columns of the format, read by other code than ours.
+TEST_F(Exchange, PythonReadsTheUff) {
+  if (!here("/usr/bin/python3")) GTEST_SKIP() << "no Python here";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep --format uff -o axis.uff").exit_code, 0);
+  workshop_.write("read.py", R"py(
+lines = open('axis.uff').read().split('    -1\n')[1].splitlines()
+assert lines[0].strip() == '58'
+assert int(lines[6][0:5]) == 4
+assert [int(lines[7][i:i + 10]) for i in (0, 20)] == [6, 0]
+count = int(lines[7][10:20])
+data = lines[12:12 + count]
+assert len(lines) == 12 + count
+for line in data:
+    print(line[0:13], line[13:33], line[33:53])
+)py");
+  const auto python = workshop_.shell("/usr/bin/python3 read.py");
+  EXPECT_EQ(python.exit_code, 0) << python.errors;
+  expect_response(python.output, 5e-10);
+}
+
+TEST_F(Exchange, JsonFollowsItsSchema) {
+  if (workshop_.shell("/usr/bin/python3 -c 'import jsonschema'").exit_code != 0)
+    GTEST_SKIP() << "no jsonschema here (Debian: apt install python3-jsonschema)";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep --format json -o axis.json").exit_code, 0);
+  workshop_.write("validate.py", R"py(
+import json, sys, jsonschema
+schema = json.load(open(sys.argv[1]))
+jsonschema.Draft7Validator.check_schema(schema)
+document = json.load(open('axis.json'))
+jsonschema.validate(document, schema)
+document['responses'][0]['points'][0]['status'] = 'fine'
+try:
+    jsonschema.validate(document, schema)
+except jsonschema.ValidationError:
+    sys.exit(0)
+sys.exit('a status that does not exist was accepted')
+)py");
+  const auto python = workshop_.shell("/usr/bin/python3 validate.py " SINERIG_SOURCE_DIR
+                                      "/docs/sinerig-sweep.schema.json");
+  EXPECT_EQ(python.exit_code, 0) << python.errors;
+}
+
+TEST_F(Exchange, CompareTellsByItsExitCode) {
+  for (const char* format : {"csv", "mat"}) {
+    const std::string name = std::string{"axis."} + format;
+    workshop_.sinerig(std::string{"export axis.sweep --channel motor --format "} + format + " -o " +
+                      name);
+    const auto same = workshop_.sinerig("compare axis.sweep " + name);
+    EXPECT_EQ(same.exit_code, 0) << same.errors << same.output;
+    EXPECT_THAT(same.output, HasSubstr("same: no change"));
+  }
+  workshop_.shell("sed 's/^a = .*/a = [[-15.0, -110000.0, 10.0],/' " SINERIG_SOURCE_DIR
+                  "/config/two-mass.toml > softer.toml");
+  ASSERT_EQ(workshop_.sinerig("run softer.toml --no-report").exit_code, 0);
+  const auto changed = workshop_.sinerig("compare axis.sweep softer.sweep -o both.html");
+  EXPECT_EQ(changed.exit_code, 5) << changed.output;
+  EXPECT_THAT(changed.output, HasSubstr("changed:"));
+  EXPECT_THAT(workshop_.read("both.html"), HasSubstr("<title>axis against softer"));
+  EXPECT_EQ(workshop_.sinerig("compare axis.sweep").exit_code, 2);
+  workshop_.write("far.csv", "0.001,1,0\n");
+  const auto nothing = workshop_.sinerig("compare axis.sweep far.csv");
+  EXPECT_EQ(nothing.exit_code, 1);
+  EXPECT_THAT(nothing.errors, HasSubstr("nothing to compare"));
+}
+
+TEST_F(Exchange, CommandsTakeFilesMeasuredElsewhere) {
+  workshop_.write("other.csv", "freq_hz,re,im,std\n1,1,0,0.01\n10,0.5,-0.5,0.01\n");
+  EXPECT_EQ(workshop_.sinerig("report other.csv").exit_code, 0);
+  EXPECT_TRUE(workshop_.has("other.html"));
+  EXPECT_THAT(workshop_.sinerig("show other.csv").output, HasSubstr("imported"));
+  EXPECT_EQ(workshop_.sinerig("export other.csv --format mat").exit_code, 2);
+}
+
+}  // namespace
+}  // namespace sinerig

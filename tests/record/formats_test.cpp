@@ -1,0 +1,194 @@
+// What is written can be read back: CSV and MATLAB files to the last bit, UFF 58 to its columns.
+#include <cmath>
+#include <fstream>
+#include <limits>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "record/exporters.h"
+#include "record/mat_file.h"
+#include "record/measured.h"
+#include "record/point_columns.h"
+#include "record/uff58.h"
+#include "support/program.h"
+#include "support/stored_runs.h"
+
+namespace sinerig::record {
+namespace {
+
+using testing::HasSubstr;
+
+class Formats : public testing::Test {
+ protected:
+  std::string path(const std::string& name) const { return (workshop_.folder() / name).string(); }
+
+  std::string refusal(const std::string& name, const std::string& text) {
+    workshop_.write(name, text);
+    try {
+      import_responses(path(name));
+    } catch (const SweepFileError& error) {
+      return error.what();
+    }
+    return "accepted";
+  }
+
+  test::Workshop workshop_;
+  StoredRun run_ = test::two_channel_run(20);
+};
+
+void expect_same(double a, double b, const char* what) {
+  if (std::isnan(a) && std::isnan(b)) return;
+  EXPECT_EQ(a, b) << what;
+}
+
+void expect_same_points(const std::vector<StoredPoint>& a, const std::vector<StoredPoint>& b) {
+  ASSERT_EQ(a.size(), b.size());
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    expect_same(a[i].frequency_hz, b[i].frequency_hz, "freq_hz");
+    expect_same(a[i].response.real(), b[i].response.real(), "re");
+    expect_same(a[i].response.imag(), b[i].response.imag(), "im");
+    expect_same(a[i].covariance.re_re, b[i].covariance.re_re, "var_re");
+    expect_same(a[i].covariance.re_im, b[i].covariance.re_im, "cov_re_im");
+    expect_same(a[i].covariance.im_im, b[i].covariance.im_im, "var_im");
+    for (const PointColumn& column : point_columns)
+      expect_same(a[i].*column.value, b[i].*column.value, column.name);
+    EXPECT_EQ(a[i].status, b[i].status);
+    EXPECT_EQ(a[i].reason, b[i].reason);
+  }
+}
+
+TEST_F(Formats, CsvLosesNothing) {
+  run_.responses[1].points[3].reason = "target_not_reached";
+  run_.responses[1].points[3].reason_value = 1.0 / 3.0;
+  std::ofstream stream{path("a.csv")};
+  write_csv(stream, run_, run_.responses[1]);
+  stream.close();
+  const auto back = import_responses(path("a.csv"));
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].output.name, "gyro");
+  EXPECT_EQ(back[0].output.unit, "rad/s");
+  EXPECT_EQ(back[0].input.name, "applied");
+  EXPECT_EQ(back[0].input.unit, "Nm");
+  expect_same_points(back[0].points, run_.responses[1].points);
+}
+
+TEST_F(Formats, MatLosesNothing) {
+  run_.responses[0].points[5].reason = "stuck";
+  run_.channels[3].unit = "µrad/s";
+  write_mat(path("a.mat"), run_, {&run_.responses[0], &run_.responses[1]});
+  const auto back = import_responses(path("a.mat"));
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_EQ(back[0].output.name, "encoder");
+  EXPECT_EQ(back[1].output.unit, "µrad/s");
+  expect_same_points(back[0].points, run_.responses[0].points);
+  expect_same_points(back[1].points, run_.responses[1].points);
+}
+
+TEST_F(Formats, MatRefusesResponsesOfDifferentFrequencies) {
+  run_.responses[1].points.pop_back();
+  try {
+    write_mat(path("a.mat"), run_, {&run_.responses[0], &run_.responses[1]});
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("do not share their frequencies"));
+    EXPECT_THAT(error.what(), HasSubstr("--channel"));
+  }
+}
+
+TEST_F(Formats, UffKeepsWhatItsColumnsHold) {
+  std::ostringstream text;
+  write_uff58(text, run_, {&run_.responses[0], &run_.responses[1]}, "axis");
+  workshop_.write("a.uff", text.str());
+  const auto back = import_responses(path("a.uff"));
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_EQ(back[0].points.size(), 19U);  // one has no response
+  EXPECT_EQ(back[1].output.name, "gyro");
+  EXPECT_EQ(back[1].output.unit, "rad/s");
+  for (std::size_t i = 0; i < back[1].points.size(); ++i) {
+    const StoredPoint& written = run_.responses[1].points[i];
+    EXPECT_NEAR(back[1].points[i].frequency_hz / written.frequency_hz, 1.0, 5e-10);
+    EXPECT_NEAR(std::abs(back[1].points[i].response / written.response - 1.0), 0.0, 1e-12);
+  }
+}
+
+TEST_F(Formats, UffKeepsItsColumns) {
+  std::ostringstream text;
+  write_uff58(text, run_, {&run_.responses[1]}, std::string(200, 'x'));
+  std::istringstream lines{text.str()};
+  std::string line;
+  for (int number = 1; std::getline(lines, line); ++number) {
+    EXPECT_LE(line.size(), 80U) << number;
+    if (number < 14 || line == "    -1") continue;
+    EXPECT_EQ(line.size(), 53U);
+    EXPECT_NE(line.substr(0, 13).find('.'), std::string::npos) << "FORTRAN would scale " << line;
+  }
+}
+
+TEST_F(Formats, ReadsUffOfOtherPrograms) {
+  // Single precision, even spacing, three complex values in a line.
+  workshop_.write(
+      "b.unv",
+      "    -1\n   151\nsomething else\n    -1\n    -1\n    58\n"
+      "NONE\nNONE\nNONE\nNONE\nNONE\n"
+      "    4         0    0         0       NONE         1   3       NONE         1   3\n"
+      "         5         4         1  1.00000E+01  5.00000E+00  0.00000E+00\n"
+      "        18    0    0    0            Frequency                   Hz\n"
+      "        12    0    0    0         Acceleration                    g\n"
+      "        13    0    0    0                Force                    N\n"
+      "         0    0    0    0                 NONE                 NONE\n"
+      "  1.00000E+00 -2.00000E+00  3.00000E+00 -4.00000E+00  5.00000E+00 -6.00000E+00\n"
+      "  7.00000D+00 -8.00000D+00\n"
+      "    -1\n");
+  const auto back = import_responses(path("b.unv"));
+  ASSERT_EQ(back.size(), 1U);
+  ASSERT_EQ(back[0].points.size(), 4U);
+  EXPECT_EQ(back[0].points[3].frequency_hz, 25.0);
+  EXPECT_EQ(back[0].points[3].response, std::complex<double>(7.0, -8.0));
+  EXPECT_EQ(back[0].output.unit, "g");
+}
+
+TEST_F(Formats, ReadsPlainCsv) {
+  workshop_.write("c.csv", "1,1,0,0.1\n10;0\n");
+  EXPECT_THAT(refusal("c.csv", "1,1,0,0.1\n10,x,0,0.1\n"), HasSubstr("c.csv:2: re = \"x\""));
+  workshop_.write("d.csv", "10,0.5,-0.5,0.1\n1,1,0,0.1\n");
+  const auto plain = import_responses(path("d.csv"));
+  ASSERT_EQ(plain[0].points.size(), 2U);
+  EXPECT_EQ(plain[0].points[0].frequency_hz, 1.0);  // sorted
+  EXPECT_DOUBLE_EQ(plain[0].points[0].covariance.im_im, 0.01);
+  EXPECT_TRUE(std::isinf(plain[0].points[0].dof));
+  EXPECT_EQ(plain[0].points[0].status, "imported");
+}
+
+TEST_F(Formats, ReadsPolarCsvInRadPerSecond) {
+  workshop_.write("p.csv", "# by hand\nomega_rad_s;gain_db;phase_deg\n6.283185307179586;20;-90\n");
+  const auto polar = import_responses(path("p.csv"));
+  EXPECT_DOUBLE_EQ(polar[0].points[0].frequency_hz, 1.0);
+  EXPECT_NEAR(std::abs(polar[0].points[0].response - std::complex<double>(0.0, -10.0)), 0.0, 1e-14);
+  EXPECT_EQ(polar[0].points[0].dof, 0.0);
+}
+
+TEST_F(Formats, RefusesWithPlaceAndRule) {
+  EXPECT_THAT(refusal("a.csv", "freq,re,im\n1,2,3\n"), HasSubstr("a.csv:1: no column freq_hz"));
+  EXPECT_THAT(refusal("a.csv", "freq_hz,gain,phase\n1,2,3\n"),
+              HasSubstr("phase_deg (or phase_rad)"));
+  EXPECT_THAT(refusal("a.csv", "freq_hz,re,im\n0,2,3\n"), HasSubstr("has to be above zero"));
+  EXPECT_THAT(refusal("a.csv", "# nothing\n"), HasSubstr("holds no point"));
+  EXPECT_THAT(refusal("a.mat", "no MATLAB"), HasSubstr("is not a MATLAB file"));
+  EXPECT_THAT(refusal("a.uff", "    -1\n    58b\n"), HasSubstr("written as ASCII"));
+  EXPECT_THAT(refusal("a.uff", "nothing"), HasSubstr("holds no frequency response"));
+  EXPECT_THAT(refusal("a.xls", ""), HasSubstr("has to be .sweep, .csv"));
+  EXPECT_THROW(import_responses(path("none.csv")), SweepFileError);
+}
+
+TEST_F(Formats, ATruncatedUffIsNotHalfARun) {
+  std::ostringstream text;
+  write_uff58(text, run_, {&run_.responses[1]}, "axis");
+  const std::string half = text.str().substr(0, text.str().size() / 2);
+  const std::string whole_lines = half.substr(0, half.rfind('\n') + 1);
+  EXPECT_THAT(refusal("h.uff", whole_lines), HasSubstr("the data end before the last point"));
+}
+
+}  // namespace
+}  // namespace sinerig::record
