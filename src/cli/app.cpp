@@ -24,9 +24,8 @@ constexpr const char* description =
     "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
-    "  sinerig export gimbal.sweep --format csv -o gimbal.csv\n"
-    "  sinerig fit gimbal.sweep            a transfer function with delay and error bars";
     "  sinerig export gimbal.sweep --format mat -o gimbal.mat\n"
+    "  sinerig fit gimbal.sweep            a transfer function with delay and error bars\n"
     "  sinerig compare monday.sweep today.sweep";
 
 constexpr const char* footer =
