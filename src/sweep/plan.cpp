@@ -43,17 +43,19 @@ double whole_units(const Span& span, double samples_per_cycle, double rate_hz,
   return std::ceil(samples / unit_samples - 1e-9);
 }
 
-void check_band(const std::vector<double>& frequencies_hz, const SweepSettings& sweep,
-                double rate_hz) {
-  const bool listed = sweep.spacing == Spacing::list;
-  for (const double frequency_hz : frequencies_hz) {
-    if (frequency_hz > 0.0 && frequency_hz < rate_hz / 2.0) continue;
-    const char* key =
-        listed ? "frequencies_hz" : (frequency_hz == sweep.start_hz ? "start_hz" : "stop_hz");
+void check_band(const SweepSettings& sweep, double rate_hz) {
+  const auto check = [&](const char* key, double frequency_hz) {
+    if (frequency_hz > 0.0 && frequency_hz < rate_hz / 2.0) return;
     throw PlanRefused("sweep", key,
                       number(frequency_hz) + ": must be above 0 and below half the loop rate (" +
                           number(rate_hz / 2.0) + " Hz)");
+  };
+  if (sweep.spacing == Spacing::list) {
+    for (const double frequency_hz : sweep.frequencies_hz) check("frequencies_hz", frequency_hz);
+    return;
   }
+  check("start_hz", sweep.start_hz);
+  check("stop_hz", sweep.stop_hz);
 }
 
 void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double frequency_hz,
@@ -189,7 +191,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   if (frequencies_hz.empty()) {
     throw PlanRefused("sweep", "points", "no frequency to measure: give at least one");
   }
-  check_band(frequencies_hz, sweep, rate_hz);
+  check_band(sweep, rate_hz);
 
   SweepPlan plan{.rate_hz = rate_hz, .offset = sweep.offset, .dwells = {}};
   plan.judgement = {.settling = sweep.settling,
