@@ -21,6 +21,11 @@ SweepSettings a_sweep() {
   sweep.stop_hz = 100.0;
   sweep.points = 21;
   sweep.amplitude = 0.5;
+  sweep.settling = Settling::fixed;
+  sweep.settle = {.cycles = 4.0, .seconds = 0.5};
+  sweep.integrate = {.cycles = 8.0, .seconds = 0.5};
+  sweep.target_db = 0.0;
+  sweep.target_deg = 0.0;
   return sweep;
 }
 
@@ -102,21 +107,22 @@ TEST(Plan, MergesPointsThatFallOnOneFrequency) {
 
 TEST(Plan, HoldsWholeCyclesInWholeBlocks) {
   for (const Dwell& dwell : plan_sweep(a_sweep(), {}, rate_hz).dwells) {
-    EXPECT_EQ(dwell.settle_samples % dwell.block_samples, 0U);
+    EXPECT_EQ(dwell.settle_samples * dwell.tones.front().cycles % dwell.block_samples, 0U);
     EXPECT_GE(dwell.blocks, 1U);
     EXPECT_GE(dwell.tones.front().cycles, 1U);
     EXPECT_GE(static_cast<double>(dwell.block_samples), 0.02 * rate_hz);
-    EXPECT_EQ(dwell.samples(), dwell.settle_samples + dwell.blocks * dwell.block_samples);
+    EXPECT_EQ(dwell.max_samples, dwell.min_samples());
+    EXPECT_EQ(dwell.min_samples(), dwell.settle_samples + dwell.blocks * dwell.block_samples);
   }
 }
 
 TEST(Plan, DurationIsTheSumOfItsDwells) {
   const SweepPlan plan = plan_sweep(a_sweep(), {}, rate_hz);
-  const auto samples =
-      std::accumulate(plan.dwells.begin(), plan.dwells.end(), std::uint64_t{0},
-                      [](std::uint64_t sum, const Dwell& dwell) { return sum + dwell.samples(); });
-  EXPECT_EQ(plan.samples(), samples);
-  EXPECT_EQ(plan.seconds(), static_cast<double>(samples) / rate_hz);
+  const auto samples = std::accumulate(
+      plan.dwells.begin(), plan.dwells.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const Dwell& dwell) { return sum + dwell.min_samples(); });
+  EXPECT_EQ(plan.min_samples(), samples);
+  EXPECT_EQ(plan.min_seconds(), static_cast<double>(samples) / rate_hz);
 }
 
 TEST(Plan, SettlesForTheLargerOfCyclesAndTime) {
@@ -160,7 +166,9 @@ TEST(Plan, CountsTheRampAsPartOfSettling) {
   sweep.ramp_s = 0.25;
   const Dwell dwell = only_dwell(sweep, 10.0);
   EXPECT_EQ(dwell.ramp_samples, 250U);
-  EXPECT_EQ(dwell.settle_samples, 300U + 500U);
+  EXPECT_EQ(dwell.settle_samples, 500U);
+  sweep.ramp_s = 0.75;
+  EXPECT_EQ(only_dwell(sweep, 10.0).settle_samples, 800U);  // whole cycles
 }
 
 TEST(Amplitude, IsConstantWithoutALaw) {
@@ -286,6 +294,12 @@ INSTANTIATE_TEST_SUITE_P(
                 {.slew_per_s = 100.0},
                 "amplitude",
                 "a slew of 156.434 at 50 Hz: exceeds [limits] slew_per_s = 100"},
+        Refusal{"RampTooShortForTheSlew",
+                with([](SweepSettings& sweep) { sweep.ramp_s = 0.01; }),
+                {.slew_per_s = 6.0},
+                "ramp_s",
+                "a slew of up to 6.28318 on the ramp to 1 Hz: exceeds [limits] slew_per_s = 6; "
+                "lengthen the ramp, lower the amplitude there or raise the limit"},
         Refusal{"TooFastForTheVelocity",
                 a_list({50.0}),
                 {.velocity_max = 100.0},
@@ -307,14 +321,32 @@ INSTANTIATE_TEST_SUITE_P(
                 with([](SweepSettings& sweep) { sweep.integrate.seconds = 1e7; }),
                 {},
                 "integrate_s",
-                "the dwell at 1 Hz would last 1e+07 s: shorten settling or integration, or loosen "
+                "the dwell at 1 Hz could last 1e+07 s: shorten settling or integration, or loosen "
                 "frequency_tolerance"},
         Refusal{"EndlessSettling",
                 with([](SweepSettings& sweep) { sweep.settle.cycles = 1e300; }),
                 {},
                 "integrate_s",
-                "would last"}),
+                "could last"}),
     [](const auto& instance) { return std::string{instance.param.name}; });
+
+TEST(Plan, GivesEveryChangeOfAmplitudeHalfACycle) {
+  SweepSettings sweep = a_list({10.0, 20.0, 25.0, 40.0});
+  sweep.amplitude_table = {{.frequency_hz = 20.0, .amplitude = 0.4},
+                           {.frequency_hz = 25.0, .amplitude = 0.2}};
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  EXPECT_EQ(plan.dwells[0].ramp_samples, 0U);   // from rest, at phase zero
+  EXPECT_EQ(plan.dwells[1].ramp_samples, 0U);   // as before
+  EXPECT_EQ(plan.dwells[2].ramp_samples, 20U);  // half of 40 samples
+  EXPECT_EQ(plan.dwells[3].ramp_samples, 0U);
+  EXPECT_GE(plan.dwells[2].settle_samples, plan.dwells[2].ramp_samples);
+}
+
+TEST(Plan, AllowsARampThatIsLongEnoughForTheSlew) {
+  SweepSettings sweep = a_list({1.0});
+  sweep.ramp_s = 2.0;
+  EXPECT_EQ(plan_sweep(sweep, {.slew_per_s = 3.5}, rate_hz).dwells.size(), 1U);
+}
 
 TEST(Plan, AllowsWhatReachesALimitAndNoMore) {
   SweepSettings sweep = a_list({50.0});
