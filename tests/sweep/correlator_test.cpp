@@ -22,6 +22,9 @@ SweepPlan one_dwell(double frequency_hz, double cycles) {
   sweep.frequencies_hz = {frequency_hz};
   sweep.frequency_tolerance = 1e-9;
   sweep.amplitude = 1.0;
+  sweep.settling = Settling::fixed;
+  sweep.target_db = 0.0;
+  sweep.target_deg = 0.0;
   sweep.settle = {.cycles = 2.0, .seconds = 0.0};
   sweep.integrate = {.cycles = cycles, .seconds = 0.0};
   sweep.block = {.cycles = 1.0, .seconds = 0.0};
@@ -47,7 +50,10 @@ FakeRun run_with_sensor(const SweepPlan& plan, test::FakeSensor::Value value) {
   test::FakeSensor sensor{clock, std::move(value)};
   Sensor* const sensors[] = {&sensor};
   Guard guard{test::open_guard(1), clock.grid().period_s()};
-  SweepRunner runner{plan, {.record_samples = true}, clock, actuator, sensors, guard, run.sink};
+  SweepRunner runner{plan,    {.responses = {}, .readbacks = {}, .record_samples = true},
+                     clock,   actuator,
+                     sensors, guard,
+                     run.sink};
   RunControl control;
   run.outcome = runner.run(control);
   return run;
