@@ -78,7 +78,8 @@ class FakeSensor final : public Sensor {
  public:
   using Value = std::function<double(std::uint64_t tick)>;
 
-  FakeSensor(const Clock& clock, Value value) : clock_{clock}, value_{std::move(value)} {}
+  FakeSensor(const Clock& clock, Value value_of_tick)
+      : value{std::move(value_of_tick)}, clock_{clock} {}
 
   Sample read() noexcept override {
     const Instant now = clock_.now();
@@ -88,15 +89,15 @@ class FakeSensor final : public Sensor {
       again.fault = fault;
       return again;
     }
-    last_ = {.value = value_(now.tick), .time_ns = clock_.time_ns(now), .fault = fault};
+    last_ = {.value = value(now.tick), .time_ns = clock_.time_ns(now), .fault = fault};
     return last_;
   }
 
+  Value value;
   std::function<Fault(std::uint64_t tick)> fault_at;
 
  private:
   const Clock& clock_;
-  Value value_;
   Sample last_;
 };
 
