@@ -136,8 +136,10 @@ INSTANTIATE_TEST_SUITE_P(
         Change{"AmplitudeAboveTheSlew", 9, "slew_per_s = 2.0",
                "rig.toml:7: [sweep] amplitude = 0.5: a slew of 3.14159 at 1 Hz: exceeds [limits] "
                "slew_per_s = 2; lower the amplitude there or raise the limit"},
-        Change{"TooLong", 7, "amplitude = 0.5\nintegrate_s = 1e7",
-               "rig.toml:8: [sweep] integrate_s = 1e+07: the dwell at 1 Hz would last "
+        Change{"TooLong", 7,
+               "amplitude = 0.5\nsettling = \"fixed\"\ntarget_db = 0\ntarget_deg = 0\nintegrate_s "
+               "= 1e7",
+               "rig.toml:11: [sweep] integrate_s = 1e+07: the dwell at 1 Hz could last "
                "1e+07 s: shorten settling or integration, or loosen frequency_tolerance"},
         Change{"LimitsCrossed", 9, "command_min = 1\ncommand_max = 0",
                "rig.toml:9: [limits] command_min = 1: must be below command_max"},

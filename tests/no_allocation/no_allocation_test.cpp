@@ -82,6 +82,8 @@ std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
   sweep.points = 12;
   sweep.amplitude = 0.5;
   sweep.ramp_s = 0.05;
+  sweep.settle_max = {.cycles = 4.0, .seconds = 1.0};
+  sweep.integrate_max = {.cycles = 4.0, .seconds = 1.0};
   const SweepPlan plan = plan_sweep(sweep, {}, 1000.0);
 
   sim::SimulatedRigSettings rig_settings;
@@ -105,7 +107,10 @@ std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
   Sensor* const sensors[] = {&first, &rig.sensor(1)};
   Guard guard{guard_settings, clock.grid().period_s()};
   Outbox outbox{1 << 12, 1 << 12, Outbox::WhenFull::keep};  // never emptied: it runs full as well
-  SweepRunner runner{plan, {.record_samples = true}, clock, actuator, sensors, guard, outbox};
+  SweepRunner runner{plan,    {.responses = {}, .readbacks = {}, .record_samples = true},
+                     clock,   actuator,
+                     sensors, guard,
+                     outbox};
   RunControl control;
   runner.run(control);
   return actuator.allocations.value();

@@ -278,8 +278,10 @@ test::VirtualRun noisy_run(std::uint64_t seed) {
   sweep.points = 3;
   sweep.amplitude = 0.3;
   sweep.ramp_s = 0.1;
+  sweep.settle_max = {.cycles = 4.0, .seconds = 0.3};
+  sweep.integrate_max = {.cycles = 4.0, .seconds = 0.3};
   return test::run_virtual(plan_sweep(sweep, {}, rate_hz), noisy(seed), test::open_guard(2),
-                           {.record_samples = true});
+                           {.responses = {}, .readbacks = {}, .record_samples = true});
 }
 
 // Equal to the bit, NaN included.
@@ -304,7 +306,7 @@ TEST(AVirtualRun, RepeatsToTheBitInEveryRecord) {
     const Point& a = first.points[i];
     const Point& b = second.points[i];
     EXPECT_EQ(a.status, b.status);
-    EXPECT_EQ(a.blocks, b.blocks);
+    EXPECT_EQ(a.samples, b.samples);
     EXPECT_TRUE(same_bits(a.response.real(), b.response.real()));
     EXPECT_TRUE(same_bits(a.response.imag(), b.response.imag()));
     EXPECT_TRUE(same_bits(a.covariance.re_re, b.covariance.re_re));

@@ -44,6 +44,9 @@ struct GuardedBench {
     sweep.frequencies_hz = {frequency_hz};
     sweep.offset = neutral;
     sweep.amplitude = amplitude;
+    sweep.settling = Settling::fixed;
+    sweep.target_db = 0.0;
+    sweep.target_deg = 0.0;
     sweep.settle = {.cycles = 1.0, .seconds = 0.0};
     sweep.integrate = {.cycles = 2.0, .seconds = 0.0};
     plan = plan_sweep(sweep, {}, rate_hz);

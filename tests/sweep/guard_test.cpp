@@ -113,7 +113,7 @@ TEST(RandomViolations, ChangeTheCommandWithinATickRampItAndReleaseTheActuator) {
     constexpr double frequencies_hz[] = {20.0, 25.0, 40.0, 50.0, 62.5, 100.0};
     GuardedBench bench{frequencies_hz[random() % 6]};
     bench.settings.stop_ramp_ticks = random() % 3 == 0 ? 0 : random() % 40;
-    const std::uint64_t tick = 1 + random() % (bench.plan.samples() - 8);
+    const std::uint64_t tick = 1 + random() % (bench.plan.min_samples() - 8);
     const Violation expected = violate(bench, static_cast<int>(random() % 12), tick, random);
 
     const RunOutcome outcome = bench.run();
