@@ -127,7 +127,8 @@ ActuatorImperfections read_actuator(const Section& section) {
   if (!(actuator.min < actuator.max)) section.refuse("clamp_min", "must be below clamp_max");
   actuator.gain = section.number("gain", any_number, actuator.gain);
   actuator.quantum = section.number("quantum", zero_or_more, actuator.quantum);
-  actuator.slew_per_s = section.number("slew_limit_per_s", above_zero, actuator.slew_per_s);
+  actuator.slew_per_s =
+      section.number("slew_limit_per_s", config::above_zero_or_unlimited, actuator.slew_per_s);
   actuator.dropout_fraction =
       section.number("dropout_fraction", fraction_of_one, actuator.dropout_fraction);
   return actuator;
@@ -173,7 +174,8 @@ SimulatedSensor read_sensor(const Section& section, const SimulatedRigSettings& 
   if (!(wrong.min < wrong.max)) section.refuse("clip_min", "must be below clip_max");
   wrong.lost_fraction = section.number("lost_fraction", fraction_of_one, wrong.lost_fraction);
   wrong.late_fraction = section.number("late_fraction", fraction_of_one, wrong.late_fraction);
-  wrong.stuck_at_s = section.number("stuck_at_s", zero_or_more, wrong.stuck_at_s);
+  wrong.stuck_at_s =
+      section.number("stuck_at_s", {.min = 0.0, .or_unlimited = true}, wrong.stuck_at_s);
   return sensor;
 }
 

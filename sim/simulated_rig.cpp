@@ -159,6 +159,7 @@ class SimulatedRig::Drive final : public Actuator {
       : core_{core},
         settings_{settings},
         neutral_{neutral},
+        position_{neutral},
         held_{neutral},
         max_step_{settings.slew_per_s * core.period_s()},
         dropout_{seed} {}
@@ -170,10 +171,9 @@ class SimulatedRig::Drive final : public Actuator {
         std::uniform_real_distribution<double>{}(dropout_) < settings_.dropout_fraction;
     if (!lost) {
       const double slewed =
-          std::clamp(settings_.gain * command, held_ - max_step_, held_ + max_step_);
-      held_ =
-          std::clamp(quantise(std::clamp(slewed, settings_.min, settings_.max), settings_.quantum),
-                     settings_.min, settings_.max);
+          std::clamp(settings_.gain * command, position_ - max_step_, position_ + max_step_);
+      position_ = std::clamp(slewed, settings_.min, settings_.max);
+      held_ = std::clamp(quantise(position_, settings_.quantum), settings_.min, settings_.max);
     }
     core_.apply(held_);
     return {.value = held_,
@@ -182,6 +182,7 @@ class SimulatedRig::Drive final : public Actuator {
   }
 
   void release() noexcept override {
+    position_ = neutral_;
     held_ = neutral_;
     core_.apply(held_);
   }
@@ -190,6 +191,7 @@ class SimulatedRig::Drive final : public Actuator {
   Core& core_;
   ActuatorImperfections settings_;
   double neutral_;
+  double position_;  // within clamp and slew, before the quantiser: slow moves add up to a step
   double held_;
   double max_step_;
   std::mt19937_64 dropout_;

@@ -36,7 +36,8 @@ void count_stop_request(int /*signal*/) {
   if (RunControl* control = running.load()) control->stop_requests.fetch_add(1);
 }
 
-// SIGINT and SIGTERM become stop requests for as long as this lives.
+// SIGINT, SIGTERM and SIGHUP become stop requests for as long as this lives. A reader of the output
+// that goes away (SIGPIPE) is no reason to leave an actuator where it is.
 class StopOnSignal {
  public:
   explicit StopOnSignal(RunControl& control) {
@@ -45,10 +46,15 @@ class StopOnSignal {
     action.sa_handler = count_stop_request;
     sigaction(SIGINT, &action, &old_int_);
     sigaction(SIGTERM, &action, &old_term_);
+    sigaction(SIGHUP, &action, &old_hup_);
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &action, &old_pipe_);
   }
   ~StopOnSignal() {
     sigaction(SIGINT, &old_int_, nullptr);
     sigaction(SIGTERM, &old_term_, nullptr);
+    sigaction(SIGHUP, &old_hup_, nullptr);
+    sigaction(SIGPIPE, &old_pipe_, nullptr);
     running = nullptr;
   }
   StopOnSignal(const StopOnSignal&) = delete;
@@ -57,6 +63,8 @@ class StopOnSignal {
  private:
   struct sigaction old_int_ {};
   struct sigaction old_term_ {};
+  struct sigaction old_hup_ {};
+  struct sigaction old_pipe_ {};
 };
 
 // rig.sweep in the working directory, or rig-2.sweep … when that exists.

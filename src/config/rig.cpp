@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 
 #include "sweep/clock.h"
@@ -39,8 +40,9 @@ Range below_half(double rate_hz) {
 double read_frequency(const Section& sweep, std::string_view key, double rate_hz) {
   const double frequency_hz = sweep.number(key, above_zero);
   if (!below_half(rate_hz).contains(frequency_hz)) {
-    sweep.refuse(key, "must be below half the loop rate (" +
-                          std::to_string(static_cast<long>(rate_hz / 2.0)) + " Hz)");
+    std::ostringstream rule;
+    rule << "must be below half the loop rate (" << rate_hz / 2.0 << " Hz)";
+    sweep.refuse(key, rule.str());
   }
   return frequency_hz;
 }
@@ -79,8 +81,9 @@ void read_amplitude(const Section& section, SweepSettings& sweep) {
   } else {
     sweep.amplitude = section.number("amplitude", above_zero);
   }
-  sweep.follow_velocity = section.number("follow_velocity", above_zero, unlimited);
-  sweep.follow_acceleration = section.number("follow_acceleration", above_zero, unlimited);
+  sweep.follow_velocity = section.number("follow_velocity", above_zero_or_unlimited, unlimited);
+  sweep.follow_acceleration =
+      section.number("follow_acceleration", above_zero_or_unlimited, unlimited);
 }
 
 Span read_span(const Section& section, const std::string& name, Span fallback, Range range) {
@@ -131,9 +134,10 @@ MotionLimits read_motion(const Section& limits) {
   MotionLimits motion;
   motion.command_min = limits.number("command_min", any_number, motion.command_min);
   motion.command_max = limits.number("command_max", any_number, motion.command_max);
-  motion.slew_per_s = limits.number("slew_per_s", above_zero, motion.slew_per_s);
-  motion.velocity_max = limits.number("velocity_max", above_zero, motion.velocity_max);
-  motion.acceleration_max = limits.number("acceleration_max", above_zero, motion.acceleration_max);
+  motion.slew_per_s = limits.number("slew_per_s", above_zero_or_unlimited, motion.slew_per_s);
+  motion.velocity_max = limits.number("velocity_max", above_zero_or_unlimited, motion.velocity_max);
+  motion.acceleration_max =
+      limits.number("acceleration_max", above_zero_or_unlimited, motion.acceleration_max);
   if (!(motion.command_min < motion.command_max)) {
     limits.refuse("command_min", "must be below command_max");
   }
@@ -144,7 +148,7 @@ ChannelLimits read_channel_limits(const Section& sensor) {
   ChannelLimits limits;
   limits.min = sensor.number("min", any_number, limits.min);
   limits.max = sensor.number("max", any_number, limits.max);
-  limits.rate_per_s = sensor.number("rate_per_s", above_zero, limits.rate_per_s);
+  limits.rate_per_s = sensor.number("rate_per_s", above_zero_or_unlimited, limits.rate_per_s);
   if (!(limits.min < limits.max)) sensor.refuse("min", "must be below max");
   return limits;
 }

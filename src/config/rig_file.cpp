@@ -65,8 +65,12 @@ RigFile::~RigFile() = default;
 std::unique_ptr<RigFile> RigFile::load(const std::string& path) {
   std::ifstream stream{path, std::ios::binary};
   if (!stream) throw ConfigError(path + ": cannot be read; is the path right?");
-  std::string text{std::istreambuf_iterator<char>{stream}, {}};
-  if (stream.bad()) throw ConfigError(path + ": reading it failed; is it a file?");
+  std::string text;
+  try {
+    text.assign(std::istreambuf_iterator<char>{stream}, {});
+  } catch (const std::ios_base::failure&) {
+    throw ConfigError(path + ": reading it failed; is it a file?");
+  }
   return parse(std::move(text), path);
 }
 

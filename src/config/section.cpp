@@ -1,6 +1,7 @@
 #include "config/section.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <sstream>
 #include <utility>
@@ -27,7 +28,18 @@ const char* kind_of(const toml::node& node) {
   return "a date or time";
 }
 
+// As short as it reads back the same: 0.2, not 0.20000000000000001.
 std::string value_text(const toml::node& node) {
+  if (const auto* number = node.as_floating_point()) {
+    char text[40];
+    const auto end = std::to_chars(text, text + sizeof text, number->get());
+    return {text, end.ptr};
+  }
+  if (const toml::array* array = node.as_array()) {
+    std::string text;
+    for (const toml::node& entry : *array) text += (text.empty() ? "" : ", ") + value_text(entry);
+    return "[" + text + "]";
+  }
   std::ostringstream text;
   text << toml::node_view<const toml::node>{node};
   return text.str();
@@ -36,7 +48,7 @@ std::string value_text(const toml::node& node) {
 }  // namespace
 
 bool Range::contains(double value) const {
-  if (!std::isfinite(value)) return false;
+  if (std::isnan(value) || (std::isinf(value) && !or_unlimited)) return false;
   const bool above = open_min ? value > min : value >= min;
   const bool below = open_max ? value < max : value <= max;
   return above && below;

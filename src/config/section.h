@@ -28,6 +28,7 @@ struct Range {
   double max = std::numeric_limits<double>::infinity();
   bool open_min = false;
   bool open_max = false;
+  bool or_unlimited = false;  // inf is a value, where the key sets no bound by default
 
   bool contains(double value) const;
   std::string rule() const;  // "must be above 0 and at most 1"
@@ -35,6 +36,7 @@ struct Range {
 
 inline constexpr Range any_number{};
 inline constexpr Range above_zero{.min = 0.0, .open_min = true};
+inline constexpr Range above_zero_or_unlimited{.min = 0.0, .open_min = true, .or_unlimited = true};
 inline constexpr Range zero_or_more{.min = 0.0};
 inline constexpr Range fraction_of_one{.min = 0.0, .max = 1.0};
 

@@ -163,7 +163,7 @@ void Progress::point(const Point& point) {
   last_point_ = point_text(point.frequency_hz, point.response, to_string(point.status),
                            to_string(point.reason));
   if (!terminal_) {
-    stream_ << text("%4u/%zu ", point.dwell + 1, plan_.dwells.size()) << last_point_ << '\n';
+    stream_ << text("%4u/%zu ", point.dwell + 1, plan_.dwells.size()) << last_point_ << std::endl;
   }
 }
 

@@ -75,6 +75,7 @@ Tick MonotonicClock::wait() noexcept {
 }
 
 Instant MonotonicClock::now() const noexcept {
+  if (origin_ns_ == 0) return {};
   return {.tick = last_, .offset_ns = monotonic_ns() - origin_ns_ - grid().time_ns(last_)};
 }
 

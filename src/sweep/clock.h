@@ -61,7 +61,7 @@ class Clock {
   // has passed are skipped.
   virtual Tick wait() noexcept SINERIG_NONBLOCKING = 0;
 
-  // The present, between the last tick waited for and the next.
+  // The present, between the last tick waited for and the next; tick 0 before the first wait.
   virtual Instant now() const noexcept SINERIG_NONBLOCKING = 0;
 
   // The time base of Sample::time_ns.

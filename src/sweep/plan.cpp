@@ -43,23 +43,29 @@ double whole_units(const Span& span, double samples_per_cycle, double rate_hz,
   return std::ceil(samples / unit_samples - 1e-9);
 }
 
-void check_band(const std::vector<double>& frequencies_hz, const SweepSettings& sweep,
-                double rate_hz) {
-  const bool listed = sweep.spacing == Spacing::list;
-  for (const double frequency_hz : frequencies_hz) {
-    if (frequency_hz > 0.0 && frequency_hz < rate_hz / 2.0) continue;
-    const char* key =
-        listed ? "frequencies_hz" : (frequency_hz == sweep.start_hz ? "start_hz" : "stop_hz");
+void check_band(const SweepSettings& sweep, double rate_hz) {
+  const auto check = [&](const char* key, double frequency_hz) {
+    if (frequency_hz > 0.0 && frequency_hz < rate_hz / 2.0) return;
     throw PlanRefused("sweep", key,
                       number(frequency_hz) + ": must be above 0 and below half the loop rate (" +
                           number(rate_hz / 2.0) + " Hz)");
+  };
+  if (sweep.spacing == Spacing::list) {
+    for (const double frequency_hz : sweep.frequencies_hz) check("frequencies_hz", frequency_hz);
+    return;
   }
+  check("start_hz", sweep.start_hz);
+  check("stop_hz", sweep.stop_hz);
+}
+
+double sine_slew(double amplitude, double frequency_hz, double rate_hz) {
+  return 2.0 * amplitude * std::sin(two_pi * frequency_hz / rate_hz / 2.0) * rate_hz;
 }
 
 void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double frequency_hz,
                   double amplitude, double rate_hz) {
   const double omega_rad_s = two_pi * frequency_hz;
-  const double slew_per_s = 2.0 * amplitude * std::sin(omega_rad_s / rate_hz / 2.0) * rate_hz;
+  const double slew_per_s = sine_slew(amplitude, frequency_hz, rate_hz);
   const char* amplitude_key = sweep.amplitude_table.empty() ? "amplitude" : "amplitude_table";
   const auto refuse = [&](const char* what, double value, const char* limit_key, double limit) {
     throw PlanRefused("sweep", amplitude_key,
@@ -103,7 +109,7 @@ std::uint32_t harmonic_count(std::uint32_t wanted, const CoherentFrequency& base
   return highest;
 }
 
-Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz) {
+Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz, const Dwell* before) {
   const CoherentFrequency base = snap(asked_hz, rate_hz, sweep.frequency_tolerance);
   const auto base_samples = static_cast<double>(base.samples);
   const double samples_per_cycle = base_samples / static_cast<double>(base.cycles);
@@ -113,7 +119,11 @@ Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz) {
 
   const double bases = std::max(1.0, length(sweep.block, base_samples));
   const double block_samples = bases * base_samples;
-  const double ramp_samples = std::ceil(sweep.ramp_s * rate_hz - 1e-9);
+  const double frequency_hz = base.hz(rate_hz);
+  const double amplitude = amplitude_at(sweep, frequency_hz);
+  const bool changes = before != nullptr && before->tones.front().amplitude != amplitude;
+  const double ramp_samples =
+      std::ceil(std::max(sweep.ramp_s * rate_hz, changes ? samples_per_cycle / 2.0 : 0.0) - 1e-9);
   // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
   const double settle_unit = sweep.settling == Settling::fixed ? base_samples : 1.0;
   const double settle_samples = settle_unit * std::max(std::ceil(ramp_samples / settle_unit),
@@ -139,9 +149,9 @@ Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz) {
   dwell.settle_samples = static_cast<std::uint64_t>(settle_samples);
   dwell.blocks = static_cast<std::uint32_t>(blocks);
   dwell.max_samples = static_cast<std::uint64_t>(max_samples);
-  dwell.tones = {{.cycles = base.cycles * static_cast<std::uint64_t>(bases)}};
+  dwell.tones = {
+      {.cycles = base.cycles * static_cast<std::uint64_t>(bases), .amplitude = amplitude}};
   dwell.harmonics = harmonic_count(sweep.harmonics, base);
-  dwell.tones.front().amplitude = amplitude_at(sweep, dwell.frequency_hz(rate_hz));
   return dwell;
 }
 
@@ -153,6 +163,26 @@ Baseline make_baseline(const SweepSettings& sweep, double rate_hz) {
     baseline.oscillation = snap(sweep.bias_hz, rate_hz, sweep.frequency_tolerance);
   }
   return baseline;
+}
+
+// A dwell may begin anywhere in the cycle: a change of amplitude needs half a cycle at least, or
+// the command would jump. The envelope adds to the slew of the sine, change / ramp per tick, or
+// change · ω from rest where the ramp is shorter than the sine takes to get there.
+void check_ramp(const Dwell& dwell, double amplitude_before, const MotionLimits& limits,
+                double rate_hz) {
+  const double amplitude = dwell.tones.front().amplitude;
+  if (dwell.ramp_samples == 0 || amplitude == amplitude_before) return;
+  const double frequency_hz = dwell.frequency_hz(rate_hz);
+  const double slew_per_s =
+      sine_slew(std::max(amplitude, amplitude_before), frequency_hz, rate_hz) +
+      std::abs(amplitude - amplitude_before) *
+          std::min(rate_hz / static_cast<double>(dwell.ramp_samples), two_pi * frequency_hz);
+  if (slew_per_s <= limits.slew_per_s) return;
+  throw PlanRefused("sweep", "ramp_s",
+                    "a slew of up to " + number(slew_per_s) + " on the ramp to " +
+                        number(frequency_hz) +
+                        " Hz: exceeds [limits] slew_per_s = " + number(limits.slew_per_s) +
+                        "; lengthen the ramp, lower the amplitude there or raise the limit");
 }
 
 bool same_frequency(const Dwell& a, const Dwell& b) {
@@ -201,7 +231,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   if (frequencies_hz.empty()) {
     throw PlanRefused("sweep", "points", "no frequency to measure: give at least one");
   }
-  check_band(frequencies_hz, sweep, rate_hz);
+  check_band(sweep, rate_hz);
 
   SweepPlan plan{.rate_hz = rate_hz,
                  .baseline = make_baseline(sweep, rate_hz),
@@ -212,7 +242,8 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
                     .target_deg = sweep.target_deg,
                     .max_distortion = sweep.max_distortion};
   for (const double asked_hz : frequencies_hz) {
-    Dwell dwell = make_dwell(asked_hz, sweep, rate_hz);
+    const Dwell* before = plan.dwells.empty() ? nullptr : &plan.dwells.back();
+    Dwell dwell = make_dwell(asked_hz, sweep, rate_hz, before);
     const bool duplicate =
         std::any_of(plan.dwells.begin(), plan.dwells.end(),
                     [&](const Dwell& other) { return same_frequency(dwell, other); });
@@ -220,6 +251,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
     check_motion(sweep, limits, dwell.frequency_hz(rate_hz), dwell.tones.front().amplitude,
                  rate_hz);
     if (plan.baseline.oscillates()) dwell.bias_hz = plan.baseline.oscillation.hz(rate_hz);
+    check_ramp(dwell, before == nullptr ? 0.0 : before->tones.front().amplitude, limits, rate_hz);
     plan.dwells.push_back(std::move(dwell));
   }
   return plan;

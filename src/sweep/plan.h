@@ -58,7 +58,8 @@ struct SweepSettings {
   double follow_acceleration = unlimited;       // A·ω² is kept at or below this
 
   Level level{};
-  double ramp_s = 0.0;  // the amplitude moves from that of the last dwell to its own
+  // A dwell moves from the amplitude before to its own in this time, and in half a cycle at least.
+  double ramp_s = 0.0;
 
   Settling settling = Settling::detect;
   Span settle{.cycles = 0.0, .seconds = 0.0};           // waited for before anything is measured

@@ -55,7 +55,8 @@ Phasor phasor(std::uint64_t index, std::uint64_t samples) noexcept {
   const double angle =
       std::numbers::pi / 4.0 * (static_cast<double>(folded) / static_cast<double>(samples));
   const double cosine = std::cos(angle);
-  const double sine = std::sin(angle);
+  // At 45° the two differ by a rounding; one value keeps the symmetry.
+  const double sine = folded == samples ? cosine : std::sin(angle);
   switch (octant) {
     case 0: return {cosine, sine};
     case 1: return {sine, cosine};

@@ -1,0 +1,249 @@
+// The commands end to end: output, files and exit codes.
+#include <cmath>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "record/sweep_reader.h"
+#include "support/process.h"
+
+namespace sinerig {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+// Three turns of dead time at the highest frequency, so that the phase has to be unwrapped.
+constexpr const char* rig_text =
+    "[loop]\nrate_hz = 1000\n"
+    "[sweep]\nstart_hz = 1\nstop_hz = 100\npoints = 30\namplitude = 0.5\n"
+    "settling = \"fixed\"\nsettle_s = 0.5\nintegrate_s = 0.3\ntarget_db = 0\ntarget_deg = 0\n"
+    "[limits]\n[actuator]\nunit = \"V\"\n[sensor.gyro]\nunit = \"rad/s\"\n"
+    "[plant]\nkind = \"transfer_function\"\nnum = [60]\nden = [1, 60]\ndelay_s = 0.03\n";
+
+class CommandLine : public test::ProgramTest {
+ protected:
+  CommandLine() { write("rig.toml", rig_text); }
+};
+
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream{text};
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+TEST_F(CommandLine, RunsShowsAndExports) {
+  const auto ran = run({"run", "rig.toml"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("outcome  done"));
+  EXPECT_THAT(ran.err, HasSubstr("wrote rig.sweep"));
+  EXPECT_EQ(record::read_sweep(path("rig.sweep")).responses.at(0).points.size(), 30U);
+
+  const auto shown = run({"show", "rig.sweep"});
+  EXPECT_EQ(shown.code, 0);
+  EXPECT_THAT(shown.out, HasSubstr("gyro / applied   (rad/s per V)"));
+
+  const auto csv = run({"export", "rig.sweep", "--format", "csv"});
+  EXPECT_EQ(csv.code, 0);
+  const auto rows = lines_of(csv.out);
+  ASSERT_EQ(rows.size(), 31U);
+  EXPECT_THAT(rows[0], StartsWith("freq_hz,re,im,gain_db,phase_deg"));
+  double before = 0.0;
+  for (std::size_t i = 1; i < rows.size(); ++i) {
+    std::vector<double> values;
+    std::istringstream row{rows[i]};
+    for (std::string value; values.size() < 5 && std::getline(row, value, ',');) {
+      values.push_back(std::stod(value));
+    }
+    ASSERT_EQ(values.size(), 5U);
+    EXPECT_NEAR(values[3], 20.0 * std::log10(std::hypot(values[1], values[2])), 1e-9);
+    EXPECT_LT(values[4], before);  // never jumps back by a turn
+    before = values[4];
+  }
+  EXPECT_LT(before, -360.0 * 2.9);
+}
+
+TEST_F(CommandLine, ExportsEverythingAsJson) {
+  ASSERT_EQ(run({"run", "rig.toml"}).code, 0);
+  const auto exported = run({"export", "rig.sweep", "--format", "json", "-o", "rig.json"});
+  EXPECT_EQ(exported.code, 0);
+  EXPECT_EQ(exported.out, "");
+  const auto json = nlohmann::json::parse(read("rig.json"));
+  EXPECT_EQ(json.at("rate_hz"), 1000.0);
+  EXPECT_EQ(json.at("rig").at("text"), rig_text);
+  EXPECT_EQ(json.at("responses").at(0).at("points").size(), 30U);
+  EXPECT_EQ(json.at("responses")[0].at("output"), "gyro");
+  EXPECT_EQ(json.at("channels").size(), 3U);
+  EXPECT_EQ(json.at("plan").size(), 30U);
+}
+
+TEST_F(CommandLine, NeverOverwritesWithoutForce) {
+  ASSERT_EQ(run({"run", "rig.toml", "-o", "a.sweep"}).code, 0);
+  const auto again = run({"run", "rig.toml", "-o", "a.sweep"});
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("a.sweep: exists already; choose another name with -o, or "
+                                   "--force to replace it"));
+  EXPECT_EQ(run({"run", "rig.toml", "-o", "a.sweep", "--force"}).code, 0);
+  ASSERT_EQ(run({"export", "a.sweep", "-o", "a.csv"}).code, 0);
+  EXPECT_EQ(run({"export", "a.sweep", "-o", "a.csv"}).code, 2);
+  EXPECT_EQ(run({"export", "a.sweep", "-o", "a.csv", "--force"}).code, 0);
+}
+
+TEST_F(CommandLine, NumbersTheDefaultOutput) {
+  ASSERT_EQ(run({"run", "rig.toml"}).code, 0);
+  ASSERT_EQ(run({"run", "rig.toml"}).code, 0);
+  ASSERT_EQ(run({"run", "rig.toml"}).code, 0);
+  for (const char* name : {"rig.sweep", "rig-2.sweep", "rig-3.sweep"}) {
+    EXPECT_TRUE(std::filesystem::exists(path(name))) << name;
+  }
+}
+
+TEST_F(CommandLine, PrintsPlainLinesWhenPiped) {
+  const auto ran = run({"run", "rig.toml"});
+  EXPECT_THAT(ran.out, HasSubstr("   1/30 "));
+  EXPECT_THAT(ran.out, HasSubstr("  30/30 "));
+  EXPECT_THAT(ran.out, Not(HasSubstr("\033")));
+  EXPECT_THAT(ran.out, Not(HasSubstr("\r")));
+  EXPECT_THAT(ran.err, Not(HasSubstr("\033")));
+}
+
+TEST_F(CommandLine, PlansWithoutLeavingAFile) {
+  const auto planned = run({"plan", "rig.toml"});
+  EXPECT_EQ(planned.code, 0);
+  for (const char* word : {"asked Hz", "exact Hz", "amplitude", "velocity", "acceleration",
+                           "30 points", "of bench time"}) {
+    EXPECT_THAT(planned.out, HasSubstr(word));
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("rig.sweep")));
+}
+
+TEST_F(CommandLine, RunsWithItsStandardInputClosed) {
+  const auto ran =
+      test::Program{{"run", "rig.toml"}, folder_, test::Program::Stdin::closed}.finish();
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_EQ(run({"show", "rig.sweep"}).code, 0);
+}
+
+TEST_F(CommandLine, HelpsAndTellsItsVersion) {
+  const auto help = run({"--help"});
+  EXPECT_EQ(help.code, 0);
+  for (const char* word : {"plan", "run", "show", "export", "Exit codes", "config/"}) {
+    EXPECT_THAT(help.out, HasSubstr(word));
+  }
+  const auto version = run({"--version"});
+  EXPECT_EQ(version.code, 0);
+  EXPECT_THAT(version.out, testing::MatchesRegex("sinerig [0-9]+\\.[0-9]+\\.[0-9]+\n"));
+  EXPECT_EQ(run({"run", "--help"}).code, 0);
+}
+
+TEST_F(CommandLine, CallsBadUsageTwo) {
+  EXPECT_EQ(run({}).code, 2);
+  EXPECT_EQ(run({"fly"}).code, 2);
+  EXPECT_EQ(run({"run"}).code, 2);
+  EXPECT_EQ(run({"export", "a.sweep", "--format", "xls"}).code, 2);
+  EXPECT_EQ(run({"plan", "rig.toml", "--log-level", "loud"}).code, 2);
+}
+
+TEST_F(CommandLine, CallsABadRigFileTwoWithItsPlace) {
+  std::string text = rig_text;
+  text.replace(text.find("stop_hz = 100"), 13, "stop_hz = 900");
+  write("bad.toml", text);
+  for (const char* command : {"plan", "run"}) {
+    const auto refused = run({command, "bad.toml"});
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_EQ(refused.err,
+              "error: bad.toml:5: [sweep] stop_hz = 900: must be below half the loop "
+              "rate (500 Hz)\n");
+  }
+  EXPECT_FALSE(std::filesystem::exists(path("bad.sweep")));
+  EXPECT_EQ(run({"plan", "nowhere.toml"}).code, 2);
+  EXPECT_EQ(run({"plan", "."}).code, 2);
+}
+
+TEST_F(CommandLine, CallsABadSweepFileOneWithAMessage) {
+  const auto missing = run({"show", "none.sweep"});
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_EQ(missing.err, "error: none.sweep: does not exist\n");
+  EXPECT_EQ(run({"show", "rig.toml"}).code, 1);
+  ASSERT_EQ(run({"run", "rig.toml"}).code, 0);
+  const auto channel = run({"export", "rig.sweep", "--channel", "gyr"});
+  EXPECT_EQ(channel.code, 1);
+  EXPECT_THAT(channel.err, HasSubstr("has no response of \"gyr\"; it has gyro"));
+}
+
+TEST_F(CommandLine, CallsAStopByALimitThree) {
+  std::string text = rig_text;
+  text.replace(text.find("unit = \"rad/s\""), 14, "max = 0.3");
+  write("limit.toml", text);
+  const auto stopped = run({"run", "limit.toml"});
+  EXPECT_EQ(stopped.code, 3);
+  EXPECT_THAT(stopped.err, HasSubstr("is outside its limit 0.3"));
+  EXPECT_EQ(record::read_sweep(path("limit.sweep")).fact("outcome"), "stopped");
+}
+
+constexpr const char* real_time_rig =
+    "[loop]\nrate_hz = 500\nclock = \"monotonic\"\n"
+    "[sweep]\nspacing = \"list\"\nfrequencies_hz = [50, SECOND]\namplitude = 0.5\n"
+    "settling = \"fixed\"\nsettle_cycles = 1\nsettle_s = 0\nintegrate_cycles = 2\n"
+    "integrate_s = 0\ntarget_db = 0\ntarget_deg = 0\n"
+    "[limits]\nstop_ramp_s = 0.05\n[actuator]\n[sensor.y]\n"
+    "[plant]\nkind = \"transfer_function\"\nnum = [60]\nden = [1, 60]\n";
+
+std::string real_time_rig_with(const std::string& second_hz) {
+  std::string text = real_time_rig;
+  return text.replace(text.find("SECOND"), 6, second_hz);
+}
+
+class StopSignal : public test::ProgramTest, public testing::WithParamInterface<int> {};
+
+// The first point shows that the loop runs; the second would take minutes.
+TEST_P(StopSignal, RampsReleasesAndLeavesAReadableFile) {
+  write("rig.toml", real_time_rig_with("0.01"));
+  test::Program program{{"run", "rig.toml"}, folder_};
+  EXPECT_THAT(program.read_line(), StartsWith("   1/2 "));
+  program.send(GetParam());
+  const auto finished = program.finish();
+  EXPECT_EQ(finished.code, 4) << finished.err;
+  const auto stored = record::read_sweep(path("rig.sweep"));
+  EXPECT_EQ(stored.fact("outcome"), "interrupted");
+  EXPECT_THAT(stored.fact("outcome_detail"), HasSubstr("stop requested"));
+  std::vector<std::string> kinds;
+  for (const auto& event : stored.events) kinds.push_back(event.kind);
+  EXPECT_THAT(kinds, testing::IsSupersetOf({"tripped", "released", "finished"}));
+  ASSERT_EQ(stored.responses.at(0).points.size(), 2U);
+  EXPECT_EQ(stored.responses[0].points[0].status, "stopped");  // the lower frequency, under way
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, StopSignal, testing::Values(SIGINT, SIGTERM, SIGHUP));
+
+class AReader : public test::ProgramTest {};
+
+TEST_F(AReader, ThatGoesAwayDoesNotEndTheRun) {
+  write("rig.toml", real_time_rig_with("20"));
+  test::Program program{{"run", "rig.toml"}, folder_};
+  program.read_line();
+  program.close_output();
+  EXPECT_EQ(program.finish().code, 0);
+  EXPECT_EQ(record::read_sweep(path("rig.sweep")).fact("outcome"), "done");
+}
+
+class AKilledRun : public test::ProgramTest {};
+
+TEST_F(AKilledRun, LeavesAFileThatCanBeShown) {
+  write("rig.toml", real_time_rig_with("0.01"));
+  {
+    test::Program program{{"run", "rig.toml"}, folder_};
+    program.read_line();
+    program.send(SIGKILL);
+    EXPECT_EQ(program.finish().code, -SIGKILL);
+  }
+  const auto shown = run({"show", "rig.sweep"});
+  EXPECT_EQ(shown.code, 0) << shown.err;
+  EXPECT_THAT(shown.out, HasSubstr("not finished"));
+}
+
+}  // namespace
+}  // namespace sinerig

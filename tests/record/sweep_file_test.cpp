@@ -1,0 +1,292 @@
+// The sweep file: what is written is what is read, what is there is not overwritten, and what an
+// interrupted run leaves can be read.
+#include <cmath>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+#include <sys/resource.h>
+
+#include "record/recorder.h"
+#include "record/schema.h"
+#include "record/sweep_reader.h"
+
+namespace sinerig::record {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class SweepFile : public testing::Test {
+ protected:
+  SweepFile() {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~SweepFile() override { fs::remove_all(folder_); }
+
+  std::string path(const std::string& name = "run.sweep") const { return folder_ / name; }
+
+ private:
+  fs::path folder_ =
+      fs::path{testing::TempDir()} / testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+RunInfo an_info() {
+  SweepSettings sweep;
+  sweep.start_hz = 1.0;
+  sweep.stop_hz = 10.0;
+  sweep.points = 3;
+  sweep.amplitude = 0.5;
+  return {.rig_name = "rig.toml",
+          .rig_text = "# a rig, with an umlaut: ü\n",
+          .clock = "virtual",
+          .channels = {{"command", "V"}, {"applied", "V"}, {"gyro", "rad/s"}},
+          .plan = plan_sweep(sweep, {}, 1000.0)};
+}
+
+Point a_point(std::uint32_t dwell) {
+  Point point;
+  point.dwell = dwell;
+  point.frequency_hz = 1.25 * (dwell + 1);
+  point.response = {1.0 / 3.0, -2.0 / 7.0};
+  point.covariance = {.re_re = 1e-9, .re_im = -2e-10, .im_im = 3e-9};
+  point.input_amplitude = 0.5;
+  point.output_amplitude = 0.1;
+  return point;
+}
+
+std::string refusal_of(const std::string& path) {
+  try {
+    read_sweep(path);
+  } catch (const SweepFileError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void write_and_finish(const std::string& path) {
+  SweepWriter writer{path, an_info(), SweepWriter::IfExists::refuse};
+  writer.finish();
+}
+
+void execute(const std::string& path, const char* sql) {
+  sqlite3* database = nullptr;
+  ASSERT_EQ(sqlite3_open(path.c_str(), &database), SQLITE_OK);
+  EXPECT_EQ(sqlite3_exec(database, sql, nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(database);
+}
+
+TEST_F(SweepFile, IsReadBackAsItWasWritten) {
+  const RunInfo info = an_info();
+  {
+    SweepWriter writer{path(), info, SweepWriter::IfExists::refuse};
+    writer.write(Event{.kind = EventKind::started});
+    writer.write(a_point(1));
+    writer.write(a_point(0));
+    Point unknown = a_point(2);
+    unknown.response = {std::nan(""), std::nan("")};
+    unknown.status = PointStatus::rt_fault;
+    unknown.reason = PointReason::gaps;
+    unknown.reason_value = 3.0;
+    writer.write(unknown);
+    writer.write(DwellTiming{.dwell = 0, .first_tick = 7, .ticks = 100, .skipped = 2});
+    const Trip trip{.cause = TripCause::channel_limit, .channel = 0, .value = 3.0, .limit = 2.0};
+    writer.write(Event{.kind = EventKind::tripped, .tick = 12, .trip = trip});
+    writer.set("outcome", "stopped");
+    writer.finish();
+  }
+  const StoredRun run = read_sweep(path());
+  EXPECT_EQ(run.fact("rig_text"), info.rig_text);
+  EXPECT_EQ(run.fact("rig_name"), "rig.toml");
+  EXPECT_EQ(run.fact("clock"), "virtual");
+  EXPECT_EQ(run.fact("outcome"), "stopped");
+  EXPECT_NE(run.fact("finished_utc"), "");
+  EXPECT_EQ(run.fact("nothing"), "");
+  ASSERT_EQ(run.channels.size(), 3U);
+  EXPECT_EQ(run.channels[2].name, "gyro");
+  EXPECT_EQ(run.plan.rate_hz, 1000.0);
+  ASSERT_EQ(run.plan.dwells.size(), info.plan.dwells.size());
+  for (std::size_t i = 0; i < run.plan.dwells.size(); ++i) {
+    EXPECT_EQ(run.plan.dwells[i].asked_hz, info.plan.dwells[i].asked_hz);
+    EXPECT_EQ(run.plan.dwells[i].min_samples(), info.plan.dwells[i].min_samples());
+    EXPECT_EQ(run.plan.dwells[i].tones.at(0).cycles, info.plan.dwells[i].tones.at(0).cycles);
+    EXPECT_EQ(run.plan.dwells[i].tones[0].amplitude, 0.5);
+  }
+  ASSERT_EQ(run.responses.size(), 1U);
+  const auto& points = run.responses[0].points;
+  ASSERT_EQ(points.size(), 3U);
+  EXPECT_EQ(points[0].frequency_hz, 1.25);  // by rising frequency
+  EXPECT_EQ(points[0].response, (std::complex<double>{1.0 / 3.0, -2.0 / 7.0}));
+  EXPECT_EQ(points[0].covariance.re_im, -2e-10);
+  EXPECT_EQ(points[0].status, "good");
+  EXPECT_TRUE(std::isnan(points[2].response.real()));
+  EXPECT_EQ(points[2].status, "rt_fault");
+  EXPECT_EQ(points[2].reason, "gaps");
+  EXPECT_EQ(points[2].reason_value, 3.0);
+  ASSERT_EQ(run.timings.size(), 1U);
+  EXPECT_EQ(run.timings[0].first_tick, 7U);
+  EXPECT_EQ(run.timings[0].skipped, 2U);
+  ASSERT_EQ(run.events.size(), 2U);
+  EXPECT_EQ(run.events[1].kind, "tripped");
+  EXPECT_THAT(run.events[1].detail, HasSubstr("gyro = 3 is outside its limit 2"));
+}
+
+TEST_F(SweepFile, IsOnePlainFileOnceItIsFinished) {
+  write_and_finish(path());
+  EXPECT_TRUE(fs::exists(path()));
+  EXPECT_FALSE(fs::exists(path() + "-wal"));
+  EXPECT_FALSE(fs::exists(path() + "-shm"));
+}
+
+TEST_F(SweepFile, IsNotOverwrittenUnlessTold) {
+  write_and_finish(path());
+  try {
+    SweepWriter{path(), an_info(), SweepWriter::IfExists::refuse};
+    FAIL();
+  } catch (const FileExists& error) {
+    EXPECT_EQ(error.what(),
+              path() + ": exists already; choose another name with -o, or --force to replace it");
+  }
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::replace};
+  writer.set("outcome", "again");
+  writer.finish();
+  EXPECT_EQ(read_sweep(path()).fact("outcome"), "again");
+}
+
+TEST_F(SweepFile, OfARunThatWasKilledHoldsEveryFinishedDwell) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  writer.write(a_point(0));
+  writer.write(DwellTiming{.dwell = 0});
+  writer.write(a_point(1));  // its dwell is still running
+  // What a power cut would leave: the files as they are on the disk now.
+  for (const char* suffix : {"", "-wal"}) {
+    fs::copy_file(path() + suffix, path("left.sweep") + suffix);
+  }
+  const StoredRun run = read_sweep(path("left.sweep"));
+  ASSERT_EQ(run.responses.size(), 1U);
+  EXPECT_EQ(run.responses[0].points.size(), 1U);
+  EXPECT_EQ(run.fact("outcome"), "");
+  EXPECT_EQ(run.fact("rig_text"), an_info().rig_text);
+}
+
+TEST_F(SweepFile, IsLeftNowhereWhenItIsDiscarded) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  writer.discard();
+  EXPECT_FALSE(fs::exists(path()));
+  EXPECT_FALSE(fs::exists(path() + "-wal"));
+}
+
+TEST_F(SweepFile, CarriesItsIdentityAndVersion) {
+  write_and_finish(path());
+  Database database{path(), Database::Mode::read};
+  EXPECT_EQ(database.pragma("application_id"), application_id);
+  EXPECT_EQ(database.pragma("user_version"), schema_version);
+}
+
+TEST_F(SweepFile, IsRefusedWhenItIsSomethingElse) {
+  EXPECT_EQ(refusal_of(path("none")), path("none") + ": does not exist");
+  std::ofstream{path("text")} << "freq_hz,re,im\n" << std::string(2000, 'x');
+  EXPECT_THAT(refusal_of(path("text")), HasSubstr("file is not a database"));
+  execute(path("other"), "CREATE TABLE a (b); PRAGMA application_id = 7;");
+  EXPECT_EQ(refusal_of(path("other")), path("other") + ": is not a sweep file");
+  std::ofstream{path("empty")};
+  EXPECT_EQ(refusal_of(path("empty")), path("empty") + ": is not a sweep file");
+}
+
+TEST_F(SweepFile, OfANewerVersionIsRefused) {
+  write_and_finish(path());
+  execute(path(), "PRAGMA user_version = 99;");
+  EXPECT_EQ(refusal_of(path()),
+            path() + ": was written by a newer sinerig (file version 99, this one reads up to " +
+                std::to_string(schema_version) + ")");
+}
+
+TEST_F(SweepFile, ThatCannotBeCreatedSaysWhy) {
+  try {
+    SweepWriter{path("no/such/folder.sweep"), an_info(), SweepWriter::IfExists::refuse};
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("cannot be opened: unable to open database file"));
+  }
+}
+
+// Files of this process cannot grow beyond `bytes` while it lives: a full disk.
+class FullDisk {
+ public:
+  explicit FullDisk(rlim_t bytes) {
+    std::signal(SIGXFSZ, SIG_IGN);
+    getrlimit(RLIMIT_FSIZE, &before_);
+    rlimit limit = before_;
+    limit.rlim_cur = bytes;
+    setrlimit(RLIMIT_FSIZE, &limit);
+  }
+  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
+
+ private:
+  rlimit before_{};
+};
+
+TEST_F(SweepFile, OnAFullDiskStopsTheLoopAndSaysSo) {
+  Outbox outbox{1 << 10, 1 << 10, Outbox::WhenFull::wait};
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  Recorder recorder{outbox, writer, {}};
+  const FullDisk full{fs::file_size(path() + "-wal") + 4096};
+  std::uint64_t put = 0;
+  while (outbox.flush() && put < 1'000'000) {
+    outbox.put(Event{.kind = EventKind::gap, .tick = put++});
+    if (put % 100 == 0) outbox.put(DwellTiming{.dwell = static_cast<std::uint32_t>(put)});
+  }
+  EXPECT_LT(put, 1'000'000U);
+  outbox.close();
+  try {
+    recorder.finish();
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr(path() + ": "));
+  }
+}
+
+TEST_F(SweepFile, IsWrittenByAThreadBesideTheLoop) {
+  Outbox outbox{64, 1 << 12, Outbox::WhenFull::wait};
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  std::uint64_t seen = 0;
+  {
+    Recorder recorder{outbox, writer, [&](const Record&) {
+                        ++seen;
+                      }};
+    for (std::uint64_t tick = 0; tick < 2000; ++tick) {
+      outbox.put_sample({.tick = tick, .channels = 3, .values = {1.0, 2.0, 3.0}});
+    }
+    outbox.put(a_point(0));
+    outbox.close();
+    recorder.finish();
+  }
+  writer.finish();
+  EXPECT_EQ(seen, 2001U);
+  EXPECT_EQ(read_sweep(path()).responses.at(0).points.size(), 1U);
+  Database database{path(), Database::Mode::read};
+  Statement count{database, "SELECT count(*) FROM sample"};
+  ASSERT_TRUE(count.step());
+  EXPECT_EQ(count.integer(0), 6000);
+}
+
+TEST(UnwrappedPhase, TakesOutWholeTurnsAndStepsOverMissingPoints) {
+  std::vector<StoredPoint> points(8);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].response = std::polar(1.0, -0.9 * static_cast<double>(i));
+  }
+  points[3].response = {std::nan(""), std::nan("")};
+  const auto phase = unwrapped_phase(points);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i != 3) {
+      EXPECT_NEAR(phase[i], -0.9 * static_cast<double>(i), 1e-12);
+    }
+  }
+  EXPECT_TRUE(std::isnan(phase[3]));
+}
+
+}  // namespace
+}  // namespace sinerig::record

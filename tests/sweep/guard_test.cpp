@@ -1,0 +1,283 @@
+// From a violation to a changed command: at most one tick, whatever is violated and whenever.
+#include "sweep/guard.h"
+
+#include <cmath>
+#include <limits>
+#include <random>
+#include <stdexcept>
+
+#include <gmock/gmock.h>
+
+#include "support/guarded_bench.h"
+#include "support/parameters.h"
+
+namespace sinerig {
+namespace {
+
+using test::GuardedBench;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double infinity = std::numeric_limits<double>::infinity();
+
+struct Violation {
+  TripCause cause;
+  std::uint64_t last_planned;  // the last tick whose command is the planned one
+  std::uint64_t tripped_at;
+  bool at_once = false;
+};
+
+// Sets one violation up at about `tick` and says what the guard has to make of it.
+Violation violate(GuardedBench& bench, int kind, std::uint64_t tick, std::mt19937_64& random) {
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<double>{low, high}(random);
+  };
+  const auto sensor_reads = [&bench, tick](double value) {
+    bench.sensor.value = [=](std::uint64_t now) {
+      return now >= tick ? value : GuardedBench::reading;
+    };
+  };
+  const auto first_tick = [](const auto& violated) {
+    std::uint64_t found = 1;
+    while (!violated(found)) ++found;
+    return found;
+  };
+  ChannelLimits& limits = bench.settings.channels[0];
+  switch (kind) {
+    case 0:
+      limits.max = between(0.21, 5.0);
+      sensor_reads(limits.max * between(1.0001, 10.0));
+      return {TripCause::channel_limit, tick, tick};
+    case 1:
+      limits.min = between(-5.0, 0.19);
+      sensor_reads(limits.min - between(0.0001, 10.0));
+      return {TripCause::channel_limit, tick, tick};
+    case 2: sensor_reads(nan); return {TripCause::channel_not_finite, tick, tick};
+    case 3:
+      sensor_reads(random() % 2 == 0 ? infinity : -infinity);
+      return {TripCause::channel_not_finite, tick, tick};
+    case 4:
+      limits.rate_per_s = between(1.0, 100.0);
+      sensor_reads(GuardedBench::reading + limits.rate_per_s * 1e-3 * between(1.001, 3.0));
+      return {TripCause::channel_rate, tick, tick};
+    case 5: {
+      const std::uint64_t patience = 1 + random() % 5;
+      bench.settings.max_age_ns = static_cast<std::int64_t>(patience) * 1'000'000;
+      bench.sensor.fault_at = [=](std::uint64_t now) {
+        return now >= tick ? Fault::stale : Fault::none;
+      };
+      return {TripCause::channel_age, tick + patience, tick + patience};
+    }
+    case 6: {
+      bench.settings.max_write_faults = static_cast<std::uint32_t>(1 + random() % 3);
+      bench.actuator.fault_at = [=](std::uint64_t now) {
+        return now >= tick ? Fault::bus : Fault::none;
+      };
+      const std::uint64_t last = tick + bench.settings.max_write_faults - 1;
+      return {TripCause::actuator_fault, last, last};
+    }
+    case 7: {
+      bench.settings.command_max = between(0.2, 0.55);
+      const std::uint64_t found = first_tick(
+          [&](std::uint64_t at) { return bench.planned(at) > bench.settings.command_max; });
+      return {TripCause::command_limit, found - 1, found};
+    }
+    case 8: {
+      bench.settings.command_min = between(-0.35, 0.0);
+      const std::uint64_t found = first_tick(
+          [&](std::uint64_t at) { return bench.planned(at) < bench.settings.command_min; });
+      return {TripCause::command_limit, found - 1, found};
+    }
+    case 9: {
+      const double largest = bench.planned(1) - bench.planned(0);
+      bench.settings.slew_per_s = largest * between(0.5, 0.99) * GuardedBench::rate_hz;
+      return {TripCause::command_slew, 0, 1};
+    }
+    case 10: bench.sink.stalled_from = tick; return {TripCause::recorder_stalled, tick, tick};
+    default: {
+      const int requests = 1 + static_cast<int>(random() % 2);
+      bench.sensor.value = [&bench, tick, requests](std::uint64_t now) {
+        if (now == tick) bench.control.stop_requests = requests;
+        return GuardedBench::reading;
+      };
+      return {TripCause::stop_requested, tick, tick + 1, requests > 1};
+    }
+  }
+}
+
+TEST(RandomViolations, ChangeTheCommandWithinATickRampItAndReleaseTheActuator) {
+  const std::uint64_t first_seed = test::seed(1);
+  for (std::uint64_t i = 0; i < test::count(10'000); ++i) {
+    SCOPED_TRACE(testing::Message()
+                 << "SINERIG_TEST_SEED=" << first_seed + i << " SINERIG_TEST_COUNT=1");
+    std::mt19937_64 random{first_seed + i};
+    constexpr double frequencies_hz[] = {20.0, 25.0, 40.0, 50.0, 62.5, 100.0};
+    GuardedBench bench{frequencies_hz[random() % 6]};
+    bench.settings.stop_ramp_ticks = random() % 3 == 0 ? 0 : random() % 40;
+    const std::uint64_t tick = 1 + random() % (bench.plan.min_samples() - 8);
+    const Violation expected = violate(bench, static_cast<int>(random() % 12), tick, random);
+
+    const RunOutcome outcome = bench.run();
+    ASSERT_STREQ(to_string(outcome.trip.cause), to_string(expected.cause));
+    ASSERT_EQ(outcome.trip.tick, expected.tripped_at);
+
+    const std::uint64_t ramp =
+        expected.at_once ? 1 : std::max<std::uint64_t>(1, bench.settings.stop_ramp_ticks);
+    const auto& writes = bench.actuator.writes;
+    ASSERT_EQ(writes.size(), expected.last_planned + 1 + ramp);
+    for (std::uint64_t k = 0; k <= expected.last_planned; ++k) {
+      ASSERT_NEAR(writes[k].command, bench.planned(k), 1e-12) << "tick " << k;
+    }
+    const double from = writes[expected.last_planned].command - GuardedBench::neutral;
+    for (std::uint64_t k = 1; k <= ramp; ++k) {
+      const double left = 1.0 - static_cast<double>(k) / static_cast<double>(ramp);
+      ASSERT_NEAR(writes[expected.last_planned + k].command, GuardedBench::neutral + from * left,
+                  1e-12);
+    }
+    ASSERT_EQ(outcome.trip.command, writes[expected.last_planned + 1].command);
+    ASSERT_EQ(bench.actuator.last, GuardedBench::neutral);
+    ASSERT_TRUE(bench.actuator.released);
+  }
+}
+
+// What cannot come out of a plan, straight at the guard.
+TEST(Guard, HoldsBackACommandThatIsNoNumber) {
+  for (const double wanted : {nan, infinity, -infinity}) {
+    Guard guard{{.command_min = -1.0, .command_max = 1.0, .neutral = 0.25, .channels = {}}, 1e-3};
+    EXPECT_EQ(guard.admit(0.5, 0, 1), 0.5);
+    EXPECT_EQ(guard.admit(wanted, 1, 1), 0.25);
+    EXPECT_EQ(guard.trip().cause, TripCause::command_not_finite);
+    EXPECT_TRUE(guard.finished());
+  }
+}
+
+TEST(Guard, AllowsTheSlewOfAsManyTicksAsHavePassed) {
+  Guard guard{{.slew_per_s = 100.0, .channels = {}}, 1e-3};
+  EXPECT_EQ(guard.admit(0.1, 1, 1), 0.1);
+  EXPECT_EQ(guard.admit(0.4, 4, 3), 0.4);
+  EXPECT_FALSE(guard.trip().tripped());
+  guard.admit(0.7, 6, 2);
+  EXPECT_EQ(guard.trip().cause, TripCause::command_slew);
+}
+
+TEST(Guard, KeepsTheFirstCause) {
+  Guard guard{{.stop_ramp_ticks = 10, .channels = {{.max = 1.0}}}, 1e-3};
+  guard.admit(1.0, 0, 1);
+  guard.stop(TripCause::stop_requested, 5);
+  guard.observe(0, {.value = 2.0, .time_ns = 6}, 6, 6);
+  EXPECT_EQ(guard.trip().cause, TripCause::stop_requested);
+  EXPECT_EQ(guard.trip().tick, 5U);
+}
+
+TEST(Guard, CutsARampShortOnASecondRequest) {
+  Guard guard{{.stop_ramp_ticks = 10, .channels = {}}, 1e-3};
+  guard.admit(1.0, 0, 1);
+  guard.stop(TripCause::stop_requested, 1);
+  EXPECT_DOUBLE_EQ(guard.admit(1.0, 1, 1), 0.9);
+  EXPECT_FALSE(guard.finished());
+  guard.stop(TripCause::stop_requested, 2, true);
+  EXPECT_EQ(guard.admit(1.0, 2, 1), 0.0);
+  EXPECT_TRUE(guard.finished());
+}
+
+TEST(Guard, RampsOnTheGridThroughAGap) {
+  Guard guard{{.stop_ramp_ticks = 10, .channels = {}}, 1e-3};
+  guard.admit(1.0, 0, 1);
+  guard.stop(TripCause::stop_requested, 1);
+  EXPECT_DOUBLE_EQ(guard.admit(0.0, 1, 1), 0.9);
+  EXPECT_DOUBLE_EQ(guard.admit(0.0, 7, 6), 0.3);
+  EXPECT_DOUBLE_EQ(guard.admit(0.0, 40, 33), 0.0);
+}
+
+TEST(Guard, TakesASingleFaultyWriteForNoDeadActuator) {
+  Guard guard{{.max_write_faults = 2, .channels = {}}, 1e-3};
+  for (std::uint64_t tick = 0; tick < 100; ++tick) {
+    guard.observe_write({.fault = tick % 2 == 0 ? Fault::bus : Fault::none}, tick);
+  }
+  EXPECT_FALSE(guard.trip().tripped());
+}
+
+TEST(Guard, WatchesASensorThatNeverAnswersFromTheFirstTick) {
+  Guard guard{{.max_age_ns = 5'000'000, .channels = {{}}}, 1e-3};
+  for (std::int64_t tick = 0; tick <= 6; ++tick) {
+    EXPECT_FALSE(guard.trip().tripped()) << tick;
+    guard.observe(0, {.fault = Fault::timeout}, (1000 + tick) * 1'000'000,
+                  static_cast<std::uint64_t>(tick));
+  }
+  EXPECT_EQ(guard.trip().cause, TripCause::channel_age);
+}
+
+TEST(Guard, ToldNotToWatchTheAgeOrTheWritesDoesNot) {
+  Guard guard{{.max_age_ns = 0, .max_write_faults = 0, .channels = {{}}}, 1e-3};
+  for (std::uint64_t tick = 0; tick < 1000; ++tick) {
+    guard.observe_write({.fault = Fault::bus}, tick);
+    guard.observe(0, {.fault = Fault::stale}, static_cast<std::int64_t>(tick) * 1'000'000, tick);
+  }
+  EXPECT_FALSE(guard.trip().tripped());
+}
+
+TEST(Guard, RefusesSettingsThatCannotBeMeant) {
+  const auto message_of = [](const GuardSettings& settings) -> std::string {
+    try {
+      const Guard guard{settings, 1e-3};
+    } catch (const std::invalid_argument& refused) {
+      return refused.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message_of({.command_min = 0.5, .command_max = 1.0, .channels = {}}),
+            "the neutral command must lie between command_min and command_max");
+  EXPECT_EQ(message_of({.neutral = nan, .channels = {}}),
+            "the neutral command must lie between command_min and command_max");
+  const std::string window = "a channel's window must have min < max and a rate above 0";
+  EXPECT_EQ(message_of({.channels = {{.min = 1.0, .max = 1.0}}}), window);
+  EXPECT_EQ(message_of({.channels = {{.rate_per_s = 0.0}}}), window);
+  EXPECT_EQ(message_of({.channels = {{.max = nan}}}), window);
+}
+
+struct Description {
+  Trip trip;
+  const char* text;
+};
+
+class TripDescription : public testing::TestWithParam<Description> {};
+
+TEST_P(TripDescription, SaysWhatWasSeenWhatIsAllowedAndWhatWasDone) {
+  EXPECT_EQ(describe(GetParam().trip, {"encoder", "gyro"}), GetParam().text);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Causes, TripDescription,
+    testing::Values(
+        Description{{}, "no trip"},
+        Description{{.cause = TripCause::stop_requested, .tick = 7},
+                    "stop requested (tick 7; command changed to 0)"},
+        Description{{.cause = TripCause::channel_limit,
+                     .channel = 1,
+                     .value = 3.2,
+                     .limit = 3.0,
+                     .tick = 812,
+                     .command = 0.5},
+                    "gyro = 3.2 is outside its limit 3 (tick 812; command changed to 0.5)"},
+        Description{{.cause = TripCause::channel_rate, .value = 70.0, .limit = 50.0},
+                    "encoder changes by 70 per second, its limit is 50 (tick 0; command changed to "
+                    "0)"},
+        Description{{.cause = TripCause::channel_not_finite, .channel = 0},
+                    "encoder is not a finite number (tick 0; command changed to 0)"},
+        Description{{.cause = TripCause::channel_age, .channel = 1, .value = 0.101, .limit = 0.1},
+                    "gyro has had no good sample for 0.101 s, its limit is 0.1 s (tick 0; command "
+                    "changed to 0)"},
+        Description{{.cause = TripCause::command_limit, .value = 0.6, .limit = 0.5},
+                    "a command of 0.6 is outside its limit 0.5 (tick 0; command changed to 0)"},
+        Description{{.cause = TripCause::command_slew, .value = 0.6, .limit = 0.5},
+                    "a command step of 0.6 exceeds the slew limit of 0.5 per tick (tick 0; command "
+                    "changed to 0)"},
+        Description{{.cause = TripCause::command_not_finite},
+                    "the command is not a finite number (tick 0; command changed to 0)"},
+        Description{{.cause = TripCause::actuator_fault, .value = 2.0, .limit = 2.0},
+                    "2 faulty writes to the actuator in a row (limit 2) (tick 0; command changed "
+                    "to 0)"},
+        Description{{.cause = TripCause::recorder_stalled},
+                    "the recorder no longer takes points (tick 0; command changed to 0)"}));
+
+}  // namespace
+}  // namespace sinerig
