@@ -25,7 +25,7 @@ options = parser.parse_args()
 
 def points(path):
     with open(path) as file:
-        return list(csv.DictReader(file))
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
 def response(row):
