@@ -165,6 +165,16 @@ Baseline make_baseline(const SweepSettings& sweep, double rate_hz) {
   return baseline;
 }
 
+void check_baseline(const Baseline& baseline, const MotionLimits& limits, double rate_hz) {
+  const double ramp_ticks = std::max(1.0, static_cast<double>(baseline.ramp_samples));
+  const double slew_per_s = std::abs(baseline.offset) / ramp_ticks * rate_hz;
+  if (slew_per_s <= limits.slew_per_s) return;
+  throw PlanRefused("sweep", "offset",
+                    "a slew of " + number(slew_per_s) +
+                        " on the way from neutral: exceeds [limits] slew_per_s = " +
+                        number(limits.slew_per_s) + "; give it a longer ramp_s");
+}
+
 // A dwell may begin anywhere in the cycle: a change of amplitude needs half a cycle at least, or
 // the command would jump. The envelope adds to the slew of the sine, change / ramp per tick, or
 // change · ω from rest where the ramp is shorter than the sine takes to get there.
@@ -237,6 +247,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
                  .baseline = make_baseline(sweep, rate_hz),
                  .level = sweep.level,
                  .dwells = {}};
+  check_baseline(plan.baseline, limits, rate_hz);
   plan.judgement = {.settling = sweep.settling,
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,

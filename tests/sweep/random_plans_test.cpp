@@ -87,7 +87,7 @@ SweepSettings random_sweep(Dice& dice, double rate_hz) {
     sweep.points = dice.up_to(6);
   }
   sweep.frequency_tolerance = dice.between_log(1e-5, 0.05);
-  sweep.offset = dice.between(-0.2, 0.2);
+  sweep.neutral = dice.between(-0.2, 0.2);
   sweep.amplitude = dice.between_log(0.1, 2.0);
   if (dice.chance(0.3)) {
     double break_hz = 0.001 * rate_hz;
@@ -149,12 +149,12 @@ TEST(RandomPlans, AreRefusedWithAReasonOrRunToTheEndOnTheClosedForm) {
     sim::SimulatedRigSettings rig;
     rig.system = plant.system;
     rig.sensors.resize(1);
-    rig.neutral = sweep.offset;
+    rig.neutral = sweep.neutral;
     GuardSettings guard = test::open_guard(1);
     guard.command_min = limits.command_min;
     guard.command_max = limits.command_max;
     guard.slew_per_s = limits.slew_per_s;
-    guard.neutral = sweep.offset;
+    guard.neutral = sweep.neutral;
     const auto run = test::run_virtual(plan, rig, guard);
     ASSERT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"y"});
     ASSERT_EQ(run.sink.points.size(), plan.dwells.size());
