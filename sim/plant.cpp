@@ -97,7 +97,7 @@ void Plant::sample(PlantTime time, std::span<double> outputs) noexcept {
     now_ = time;
   }
   for (std::size_t i = 0; i < outputs_; ++i) {
-    outputs[i] = dot(&c_[i * n_], state_.data(), n_) + d_[i] * input_;
+    outputs[i] = dot(c_.data() + i * n_, state_.data(), n_) + d_[i] * input_;
   }
 }
 
@@ -118,7 +118,7 @@ void Plant::step(double ticks) noexcept {
     return;
   }
   for (std::size_t i = 0; i < n_; ++i) {
-    scratch_[i] = dot(&known->phi[i * n_], state_.data(), n_) + known->gamma[i] * input_;
+    scratch_[i] = dot(known->phi.data() + i * n_, state_.data(), n_) + known->gamma[i] * input_;
   }
   state_.swap(scratch_);
 }
@@ -183,7 +183,7 @@ void Plant::integrate(std::span<double> state, double input, double ticks) noexc
   const double h = ticks / static_cast<double>(pieces);
   for (std::int64_t piece = 0; piece < pieces; ++piece) {
     for (std::size_t i = 0; i < n_; ++i) {
-      term_[i] = (dot(&a_[i * n_], state.data(), n_) + b_[i] * input) * h;
+      term_[i] = (dot(a_.data() + i * n_, state.data(), n_) + b_[i] * input) * h;
     }
     for (int k = 2; k < 40; ++k) {
       double largest_term = 0.0;
@@ -194,7 +194,8 @@ void Plant::integrate(std::span<double> state, double input, double ticks) noexc
         largest_state = std::max(largest_state, std::abs(state[i]));
       }
       if (largest_term <= 1e-18 * largest_state) break;
-      for (std::size_t i = 0; i < n_; ++i) product_[i] = dot(&a_[i * n_], term_.data(), n_) * h / k;
+      for (std::size_t i = 0; i < n_; ++i)
+        product_[i] = dot(a_.data() + i * n_, term_.data(), n_) * h / k;
       term_.swap(product_);
     }
   }
