@@ -28,7 +28,7 @@ function(sinerig_library name)
   target_link_libraries(${name} PUBLIC ${arg_LINK})
 endfunction()
 
-# sinerig_test(NAME LABEL unit|system|bench SOURCES a.cpp … LINK libs … [ARGS …])
+# sinerig_test(NAME LABEL unit|unit-loop|system|bench SOURCES a.cpp … LINK libs … [ARGS …])
 # One GoogleTest binary, each test case registered under the label.
 function(sinerig_test name)
   cmake_parse_arguments(arg "" "LABEL" "SOURCES;LINK" ${ARGN})
