@@ -11,7 +11,7 @@ function measured(values, band) {
       style: colour(r),
       f: r.f,
       y,
-      line: r.models.length ? 'quiet' : 'full',
+      line: band && r.models.length ? 'quiet' : 'full',
       marks: true,
       status: r.status,
       jump: band && band.jump,
@@ -130,8 +130,8 @@ function residuals(gain) {
 }
 
 const differences = gain =>
-  page.differences.map((d, n) => ({
-    style: `--c:var(--s${(n + 1) % 6})`,
+  page.differences.map(d => ({
+    style: colour(page.responses.find(r => r.name === d.name)),
     f: d.f,
     outside: d.changed,
     y: gain ? d.gain_db : d.phase_deg.map(v => inPhase((v * turn) / 360)),

@@ -169,7 +169,7 @@ class Plot {
 
   layer(l, bottom) {
     const xs = l.f.map(this.x),
-      to = v => (v === null || !Number.isFinite(v) ? null : this.y(v));
+      to = v => (v === null || !Number.isFinite(v) || (this.y.log && v <= 0) ? null : this.y(v));
     let html = '';
     if (l.low)
       html += `<path class="band ${l.neutral ? 'neutral' : ''}" d="${bandPath(xs, l.low.map(to), l.high.map(to))}"/>`;
