@@ -172,7 +172,8 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
   double heard = 0.0;
   double early = 0.0;
   // A transient is loudest in the first quarter, a burst is louder than that.
-  const std::size_t burst_first = window.first + (window.last - window.first + 3) / 4;
+  const std::size_t burst_first =
+      window.settled ? window.first : window.first + (window.last - window.first + 3) / 4;
   for (Estimate& estimate : estimates) estimate.scatter_white = 0.0;
   for (std::size_t end = window.last; end >= window.first + window.cluster; end -= window.cluster) {
     const std::size_t begin = end - window.cluster;

@@ -37,6 +37,7 @@ struct Window {
   std::size_t first = 0;
   std::size_t last = 0;
   std::size_t cluster = 1;  // checkpoints per cluster
+  bool settled = false;     // for certain: what is loud at its beginning is not a transient
 };
 
 struct Estimate {

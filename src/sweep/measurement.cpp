@@ -58,7 +58,8 @@ constexpr std::uint64_t looks_per_length = 32;
 constexpr double default_settling_tolerance = 1e-3;
 
 // One cluster this much louder than the others is a burst, if it also stands out statistically.
-constexpr double burst_ratio = 6.0;
+// At 6 the end of a transient was taken for a burst in 2 of 1000 clean points.
+constexpr double burst_ratio = 25.0;
 
 }  // namespace
 
@@ -152,11 +153,18 @@ Window Measurement::current_window() noexcept {
   const std::size_t last = regression_.checkpoints() - 1;
   const std::size_t per_block = std::max<std::size_t>(1, dwell_->parts / stride_);
   const std::size_t blocks = (last - first_) / per_block;
+  const bool settled = judgement_.settling == Settling::fixed;
   if (blocks < few_blocks) {
-    return {.first = first_, .last = last, .cluster = std::max<std::size_t>(1, per_block / 2)};
+    return {.first = first_,
+            .last = last,
+            .cluster = std::max<std::size_t>(1, per_block / 2),
+            .settled = settled};
   }
   const std::size_t merged = (blocks + most_clusters - 1) / most_clusters;
-  return {.first = first_, .last = last, .cluster = per_block * std::max<std::size_t>(1, merged)};
+  return {.first = first_,
+          .last = last,
+          .cluster = per_block * std::max<std::size_t>(1, merged),
+          .settled = settled};
 }
 
 bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {

@@ -72,7 +72,8 @@ int bias(const Options& options) {
   for (const BiasCase& each : cases) {
     const SweepPlan plan = plan_of(each.frequency_hz);
     const Dwell& dwell = plan.dwells.front();
-    const std::complex<double> truth = plant.response(dwell.frequency_hz(rate_hz));
+    const std::complex<double> truth =
+        plant.response(dwell.frequency_hz(rate_hz), each.jitter_periods / rate_hz);
     std::vector<std::complex<double>> own(options.seeds_or(200));
     std::vector<std::complex<double>> plain(own.size());
     in_parallel(own.size(), options.threads, [&](std::size_t i) {

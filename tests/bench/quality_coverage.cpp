@@ -85,7 +85,8 @@ Count run_once(const QualityPlant& plant, const SweepPlan& plan, const Setting& 
   if (setting.trouble == Trouble::jitter) sensor.jitter_s = 0.05 / rate_hz;
   Count count;
   for (const Point& point : test::run_virtual(plan, rig).sink.points) {
-    const ResponseError error = error_of(point.response, plant.response(point.frequency_hz));
+    const ResponseError error =
+        error_of(point.response, plant.response(point.frequency_hz, sensor.jitter_s));
     count.gain += error.gain_db <= point.gain_interval_db ? 1 : 0;
     count.phase += error.phase_deg <= point.phase_interval_deg ? 1 : 0;
     count.points += 1;

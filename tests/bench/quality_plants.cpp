@@ -32,6 +32,17 @@ std::complex<double> QualityPlant::response(double frequency_hz) const {
   return std::complex<double>{test::held_response(modes, two_pi * frequency_hz, 1.0 / rate_hz)};
 }
 
+std::complex<double> QualityPlant::response(double frequency_hz, double jitter_s) const {
+  constexpr int steps = 32;
+  std::complex<double> sum{};
+  for (int i = 0; i < steps; ++i) {
+    const double age_s = jitter_s * (i + 0.5) / steps;
+    const auto there = test::held_response(modes, two_pi * frequency_hz, 1.0 / rate_hz, age_s);
+    sum += std::complex<double>{there} * std::polar(1.0, two_pi * frequency_hz * age_s);
+  }
+  return sum / static_cast<double>(steps);
+}
+
 test::PartialFractions modal_form(const sim::LinearSystem& system) {
   const Eigen::EigenSolver<Eigen::MatrixXd> solver{system.a};
   const Eigen::MatrixXcd vectors = solver.eigenvectors();

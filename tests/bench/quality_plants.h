@@ -21,6 +21,10 @@ struct QualityPlant {
 
   // From command samples to output samples, of the plant behind its hold.
   std::complex<double> response(double frequency_hz) const;
+
+  // The same, referred to their true times, of samples scattered evenly over `jitter_s` before the
+  // tick: between the ticks the output of a held input is no pure sine.
+  std::complex<double> response(double frequency_hz, double jitter_s) const;
 };
 
 // "g1" … "g4" from the rig file of that name in `folder`.
