@@ -35,9 +35,15 @@ WindowEstimator::WindowEstimator(std::size_t max_bins)
     : input_{2 + 2 * max_bins},
       output_{2 + 2 * max_bins},
       cluster_{2 + 2 * max_bins},
+      plain_solver_{1 + 2 * max_bins},
+      plain_gram_(triangle(1 + 2 * max_bins)),
+      whole_{1 + 2 * max_bins},
+      late_{1 + 2 * max_bins},
+      part_input_(max_bins),
       column_(2 + 2 * max_bins),
       moved_output_(2 + 2 * max_bins),
-      moved_input_(2 + 2 * max_bins) {}
+      moved_input_(2 + 2 * max_bins),
+      scratch_(2 + 2 * max_bins) {}
 
 double WindowEstimator::Solution::variance(std::size_t order) const noexcept {
   const double dof = std::max(1.0, sums.count - static_cast<double>(order));
@@ -127,6 +133,26 @@ void WindowEstimator::influence(const Solution& solution, std::size_t order,
   solution.solver.solve(score);
 }
 
+// Mean square of what a white residual of one makes of the tone's influence of the cluster in
+// cluster_, the part that the fit takes out of it included (the correction of cluster-robust
+// variances, Bell and McCaffrey 2002): gᵀ(G_q − G_q G⁻¹ G_q)g for the tone's rows g of G⁻¹.
+double WindowEstimator::white_influence(std::size_t order, std::size_t tone) noexcept {
+  double sum = 0.0;
+  for (const std::size_t row : {Regression::sine_row(tone), Regression::cosine_row(tone)}) {
+    const std::span g{column_.data(), order};
+    std::fill(g.begin(), g.end(), 0.0);
+    g[row] = 1.0;
+    output_.solver.solve(g);
+    const std::span weighted{moved_output_.data(), order};
+    const std::span back{scratch_.data(), order};
+    multiply(cluster_.gram, g, weighted);
+    std::copy(weighted.begin(), weighted.end(), back.begin());
+    output_.solver.solve(back);
+    for (std::size_t i = 0; i < order; ++i) sum += weighted[i] * (g[i] - back[i]);
+  }
+  return 0.5 * sum;
+}
+
 // Mean square of the output's residual in the cluster in cluster_.
 double WindowEstimator::cluster_residual(std::size_t order) noexcept {
   multiply(cluster_.gram, {output_.beta.data(), order}, {column_.data(), order});
@@ -143,13 +169,27 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
   double clusters = 0.0;
   double worst = 0.0;
   double power = 0.0;
+  double heard = 0.0;
+  double early = 0.0;
+  // A transient is loudest in the first quarter, a burst is louder than that.
+  const std::size_t burst_first =
+      window.settled ? window.first : window.first + (window.last - window.first + 3) / 4;
+  for (Estimate& estimate : estimates) estimate.scatter_white = 0.0;
   for (std::size_t end = window.last; end >= window.first + window.cluster; end -= window.cluster) {
     const std::size_t begin = end - window.cluster;
     regression.window(pair.output, begin, end, cluster_);
+    for (std::size_t tone = 0; tone < estimates.size(); ++tone) {
+      estimates[tone].scatter_white += white_influence(order, tone);
+    }
     influence(output_, order, moved_output_);
     const double residual = cluster_residual(order);
-    worst = std::max(worst, residual);
-    power += residual;
+    if (begin >= burst_first) {
+      worst = std::max(worst, residual);
+      power += residual;
+      heard += 1.0;
+    } else {
+      early = std::max(early, residual);
+    }
     if (!pair.exact_input) {
       regression.window(pair.input, begin, end, cluster_);
       influence(input_, order, moved_input_);
@@ -164,16 +204,89 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
     }
     clusters += 1.0;
   }
-  const double others = (power - worst) / std::max(1.0, clusters - 1.0);
+  const double others = std::max(early, (power - worst) / std::max(1.0, heard - 1.0));
   for (Estimate& estimate : estimates) {
-    if (clusters < 2.0) {
+    if (clusters < 2.0 || !(estimate.scatter_white > 0.0)) {
       estimate.scatter = 0.0;
       continue;
     }
-    estimate.scatter *= clusters / (clusters - 1.0);
+    const double to_white = output_.variance(order) / std::norm(estimate.input);
+    estimate.scatter *= estimate.white.mean_variance() / (estimate.scatter_white * to_white);
     estimate.scatter_dof = 2.0 * (clusters - 1.0);
     estimate.burst = others > 0.0 ? worst / others : 1.0;
   }
+}
+
+namespace {
+
+// Rows of the constant and the tones among all regressors.
+std::size_t plain_row(std::size_t i) noexcept {
+  return i == 0 ? Regression::constant_row : Regression::cosine_row(0) + i - 1;
+}
+
+}  // namespace
+
+// The sums in cluster_ on the constant and the tones alone, into plain.
+bool WindowEstimator::fit_plain(std::size_t tones, Plain& plain) noexcept {
+  const std::size_t rows = 1 + 2 * tones;
+  if (cluster_.count <= static_cast<double>(rows)) return false;
+  for (std::size_t i = 0; i < rows; ++i) {
+    for (std::size_t k = 0; k <= i; ++k) {
+      plain_gram_[triangle(i) + k] = cluster_.gram[triangle(plain_row(i)) + plain_row(k)];
+    }
+    plain.beta[i] = cluster_.moments[plain_row(i)];
+  }
+  if (!plain_solver_.factor(plain_gram_, rows)) return false;
+  plain_solver_.solve(std::span{plain.beta}.first(rows));
+  double explained = 0.0;
+  for (std::size_t i = 0; i < rows; ++i)
+    explained += plain.beta[i] * cluster_.moments[plain_row(i)];
+  plain.variance =
+      std::max(0.0, cluster_.square - explained) / (cluster_.count - static_cast<double>(rows));
+  for (std::size_t row = 1; row < rows; ++row) {
+    std::fill(column_.begin(), column_.end(), 0.0);
+    column_[row] = 1.0;
+    plain_solver_.solve(std::span{column_}.first(rows));
+    plain.spread[row] = column_[row];
+  }
+  return true;
+}
+
+bool WindowEstimator::stray(const Regression& regression, const Window& window,
+                            std::size_t late_first, const Pair& pair, double most_noise,
+                            std::span<const Estimate> estimates, std::span<Stray> strays) noexcept {
+  const std::size_t tones = estimates.size();
+  const auto difference = [&](std::size_t channel) {
+    regression.window(channel, window.first, window.last, cluster_);
+    if (!fit_plain(tones, whole_)) return false;
+    regression.window(channel, late_first, window.last, cluster_);
+    return fit_plain(tones, late_);
+  };
+  const auto moved = [&](std::size_t tone) {
+    const std::size_t a = 1 + 2 * tone;
+    return std::complex<double>{late_.beta[a + 1] - whole_.beta[a + 1],
+                                late_.beta[a] - whole_.beta[a]};
+  };
+  std::fill_n(part_input_.begin(), tones, std::complex<double>{});
+  if (!pair.exact_input) {
+    if (!difference(pair.input)) return false;
+    for (std::size_t tone = 0; tone < tones; ++tone) {
+      part_input_[tone] = moved(tone) * input_.turn[tone];
+    }
+  }
+  if (!difference(pair.output)) return false;
+  const double variance = std::min(late_.variance, most_noise * most_noise);
+  for (std::size_t tone = 0; tone < tones; ++tone) {
+    const Estimate& estimate = estimates[tone];
+    const auto shift = moved(tone) * output_.turn[tone] - estimate.response * part_input_[tone];
+    const std::size_t a = 1 + 2 * tone;
+    const double spread =
+        late_.spread[a] + late_.spread[a + 1] - whole_.spread[a] - whole_.spread[a + 1];
+    strays[tone] = {
+        .shift = std::abs(shift / estimate.output),
+        .noise = std::sqrt(variance * std::max(0.0, spread)) / std::abs(estimate.output)};
+  }
+  return true;
 }
 
 }  // namespace sinerig

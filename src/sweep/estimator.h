@@ -37,21 +37,29 @@ struct Window {
   std::size_t first = 0;
   std::size_t last = 0;
   std::size_t cluster = 1;  // checkpoints per cluster
+  bool settled = false;     // for certain: what is loud at its beginning is not a transient
 };
 
 struct Estimate {
   std::complex<double> response;
   std::complex<double> input;  // U and Y at their true times, b + j a
   std::complex<double> output;
-  Covariance2 white;          // of H, were the residual white
-  double scatter = 0.0;       // variance of one component of H from the clusters
-  double scatter_dof = 0.0;   // 0: too few clusters
-  double residual_rms = 0.0;  // of the output
-  double distortion = 0.0;    // of the output: harmonics beyond the noise, relative to the tone
+  Covariance2 white;           // of H, were the residual white
+  double scatter = 0.0;        // variance of one component of H from the clusters
+  double scatter_white = 0.0;  // what that scatter is to white noise of one in the output
+  double scatter_dof = 0.0;    // 0: too few clusters
+  double residual_rms = 0.0;   // of the output
+  double distortion = 0.0;     // of the output: harmonics beyond the noise, relative to the tone
   double drift_per_sample = 0.0;
   double burst = 0.0;    // residual power of the worst cluster over that of the others
   double lost = 0.0;     // samples of the output that are missing
   double samples = 0.0;  // of the output that were used
+};
+
+// How far a part of a window strays from the fit of the whole, relative to H.
+struct Stray {
+  double shift = 0.0;  // of H
+  double noise = 0.0;  // rms of that shift if there is nothing but white noise
 };
 
 class WindowEstimator {
@@ -63,6 +71,14 @@ class WindowEstimator {
   bool estimate(const Regression& regression, const Window& window, const Pair& pair,
                 std::span<const double> omega_rad_s, std::size_t harmonics,
                 std::span<Estimate> estimates) noexcept SINERIG_NONBLOCKING;
+
+  // Of the window last estimated, fitted with constant and tones alone: how far its late part, from
+  // checkpoint `late_first` on, strays from the whole. Without the drift and the harmonics, which
+  // in a single cycle would swallow a ringing transient. The noise is that of the late part, but
+  // `most_noise` at most. False where the tones are not determined.
+  bool stray(const Regression& regression, const Window& window, std::size_t late_first,
+             const Pair& pair, double most_noise, std::span<const Estimate> estimates,
+             std::span<Stray> strays) noexcept SINERIG_NONBLOCKING;
 
  private:
   // The solution of one channel over the window.
@@ -78,21 +94,38 @@ class WindowEstimator {
     double variance(std::size_t order) const noexcept;
   };
 
+  // … and with constant and tones alone.
+  struct Plain {
+    std::vector<double> beta;
+    std::vector<double> spread;  // variance of each coefficient for a noise of one
+    double variance = 0.0;       // of the residual
+
+    explicit Plain(std::size_t rows) : beta(rows), spread(rows) {}
+  };
+
   bool solve(const Regression& regression, const Window& window, std::size_t channel,
              Solution& solution) noexcept;
   void take_coefficients(const Pair& pair, std::size_t order, std::size_t tone,
                          Estimate& estimate) noexcept;
   void take_clusters(const Regression& regression, const Window& window, const Pair& pair,
                      std::span<Estimate> estimates) noexcept;
+  double white_influence(std::size_t order, std::size_t tone) noexcept;
   double cluster_residual(std::size_t order) noexcept;
+  bool fit_plain(std::size_t tones, Plain& plain) noexcept;
   void influence(const Solution& solution, std::size_t order, std::vector<double>& moved) noexcept;
 
   Solution input_;
   Solution output_;
   NormalSums cluster_;
+  NormalSolver plain_solver_;
+  std::vector<double> plain_gram_;
+  Plain whole_;
+  Plain late_;
+  std::vector<std::complex<double>> part_input_;  // per tone
   std::vector<double> column_;
   std::vector<double> moved_output_;
   std::vector<double> moved_input_;
+  std::vector<double> scratch_;
 };
 
 }  // namespace sinerig

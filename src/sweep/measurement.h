@@ -13,6 +13,7 @@
 #include "sweep/plan.h"
 #include "sweep/records.h"
 #include "sweep/regression.h"
+#include "sweep/transient_memory.h"
 
 namespace sinerig {
 
@@ -64,18 +65,18 @@ class Measurement {
   struct Result {
     Estimate estimate{};
     PooledVariance variance{};
-    double late_shift = 0.0;  // |H of the late half − H| / |H|
-    double late_noise = 0.0;  // its rms were there no transient
+    Stray late{};       // of the late half
+    double left = 0.0;  // what the transient may have left in H, relative
     bool known = false;
   };
 
   void judge() noexcept;
-  Interval interval(const Result& result) const noexcept;
+  Interval interval(const Result& result, double scale = 1.0) const noexcept;
   void restart() noexcept;
   void end_part() noexcept;
   Window current_window() noexcept;
   bool evaluate(std::size_t pair, const Window& window) noexcept;
-  bool late_half_agrees(const Window& window) noexcept;
+  bool look_for_transient(const Window& window) noexcept;
   bool target_met() const noexcept;
   double settling_tolerance() const noexcept;
   Result& result(std::size_t pair, std::size_t tone) noexcept {
@@ -94,12 +95,15 @@ class Measurement {
   std::vector<NoiseMemory> memories_;  // per pair
   std::vector<Result> results_;        // per pair and tone
   std::vector<Estimate> estimates_;    // of the window under evaluation
+  std::vector<Stray> strays_;          // per tone
+  TransientMemory transients_;         // of the first pair
   std::vector<double> omega_;          // per bin
 
   const Dwell* dwell_ = nullptr;
   std::uint64_t samples_ = 0;  // since the start or the last disturbance
   std::uint32_t part_ = 0;     // within the block
   std::uint64_t in_block_ = 0;
+  std::uint64_t next_look_ = 0;
   std::size_t first_ = 0;   // checkpoint at which the window under judgement begins
   std::size_t stride_ = 1;  // of the regression when first_ was set
   bool block_complete_ = true;

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include "sweep/estimator.h"
 #include "sweep/nonblocking.h"
@@ -15,6 +16,7 @@ namespace sinerig {
 struct PooledVariance {
   Covariance2 covariance{};  // of H
   double dof = 0.0;          // 0: nothing is known yet
+  double expected = 1.0;     // the variance expected before the window was seen, over the above
 };
 
 class NoiseMemory {
@@ -26,6 +28,9 @@ class NoiseMemory {
   // Takes in a finished dwell.
   void learn(const Estimate& estimate, double frequency_hz) noexcept SINERIG_NONBLOCKING;
 
+  // Residual rms of the last dwell; infinite where there is none.
+  double last_rms() const noexcept { return last_rms_; }
+
  private:
   struct Lesson {
     double log_frequency = 0.0;
@@ -36,6 +41,7 @@ class NoiseMemory {
   static constexpr std::size_t capacity = 32;
   std::array<Lesson, capacity> lessons_{};
   std::size_t next_ = 0;
+  double last_rms_ = std::numeric_limits<double>::infinity();
 };
 
 }  // namespace sinerig
