@@ -8,6 +8,8 @@
 #include "cli/commands.h"
 #include "cli/fit_command.h"
 #include "cli/fit_input.h"
+#include "cli/margins_command.h"
+#include "cli/notch_command.h"
 #include "config/section.h"
 #include "record/database.h"
 #include "version.h"
@@ -26,6 +28,8 @@ constexpr const char* description =
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
     "  sinerig export gimbal.sweep --format mat -o gimbal.mat\n"
     "  sinerig fit gimbal.sweep            a transfer function with delay and error bars\n"
+    "  sinerig margins gimbal.sweep --pid 3,3,0.15,10\n"
+    "  sinerig notch gimbal.sweep --pid 3,3,0.15,10\n"
     "  sinerig compare monday.sweep today.sweep";
 
 constexpr const char* footer =
@@ -75,6 +79,77 @@ CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
   fit->add_flag("--json", options.json, "print one JSON object");
   fit->add_flag("--no-store", options.no_store, "do not store the fit in the sweep file");
   return fit;
+}
+
+void add_loop_options(CLI::App& command, LoopOptions& options) {
+  command
+      .add_option("--controller-num", options.controller_num,
+                  "controller's numerator, descending powers of s: C1,C2,...")
+      ->delimiter(',');
+  command.add_option("--controller-den", options.controller_den, "its denominator")->delimiter(',');
+  command
+      .add_option("--pid", options.pid,
+                  "controller KP,KI,KD[,FILTER_HZ]: KP + KI/s + KD s/(1 + s/(2 pi FILTER_HZ))")
+      ->delimiter(',');
+  command.add_option("--rate", options.rate_hz,
+                     "rate in Hz that the controller runs at, by Tustin behind a zero-order hold; "
+                     "0: continuous (default: the loop rate of a sweep file)");
+  command.add_option("--loop-delay", options.delay_s,
+                     "more delay in the loop, seconds: calculation, transport");
+}
+
+CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
+  CLI::App* margins = app.add_subcommand(
+      "margins", "Gain, phase and delay margin, crossover, Ms, bandwidth and resonances of a loop");
+  margins->add_option("FILE", options.file, "sweep file or CSV")->required();
+  margins
+      ->add_option("--response", options.response,
+                   "what the file is the response of: plant, loop L = PC, sensitivity 1/(1+L) or "
+                   "complementary L/(1+L)")
+      ->check(CLI::IsMember({"plant", "loop", "sensitivity", "complementary"}))
+      ->capture_default_str();
+  add_loop_options(*margins, options.loop);
+  margins->add_option("--controller-file", options.loop.controller_file,
+                      "measured response of the controller, sweep file or CSV");
+  margins->add_option("--channel", options.channel, "sensor of a sweep file (default: the first)");
+  margins->add_flag("--points-only", options.points_only, "leave the model out");
+  margins->add_flag("--refit", options.refit, "fit anew even if the sweep file holds a fit");
+  margins->add_flag("--json", options.json, "print one JSON object");
+  return margins;
+}
+
+CLI::App* add_notch(CLI::App& app, NotchOptions& options) {
+  CLI::App* notch = app.add_subcommand(
+      "notch", "Design notch filters that hold over the uncertainty and drift of the resonances");
+  notch
+      ->add_option("FILE", options.files,
+                   "sweep files or CSV; the first is the plant, all show how far it drifts")
+      ->required();
+  notch
+      ->add_option("--at", options.at_hz,
+                   "resonances to notch, Hz, by commas (default: the lowest)")
+      ->delimiter(',');
+  notch->add_option("--attenuation", options.attenuation_db,
+                    "wanted at the resonance wherever it lies, dB (default: what brings its peak "
+                    "in the loop to -12 dB, 6 at least; 20 without a controller)");
+  notch->add_option("--crossover", options.crossover_hz,
+                    "frequency where phase is to be saved, Hz (default: the gain crossover; a "
+                    "quarter of the resonance without a controller)");
+  notch
+      ->add_option("--within", options.within_hz,
+                   "more drift to allow for, Hz to each side of the resonance")
+      ->check(CLI::NonNegativeNumber);
+  notch->add_option("--fixed", options.fixed, "INTEGER.FRACTION bits of the fixed-point form")
+      ->capture_default_str();
+  notch->add_option("--format", options.format, "text, c or json")
+      ->check(CLI::IsMember({"text", "c", "json"}))
+      ->capture_default_str();
+  notch->add_flag_callback(
+      "--json", [&options] { options.format = "json"; }, "same as --format json");
+  add_loop_options(*notch, options.loop);
+  notch->add_option("--channel", options.channel, "sensor of a sweep file (default: the first)");
+  notch->add_flag("--refit", options.refit, "fit anew even if the sweep file holds a fit");
+  return notch;
 }
 
 void set_up_logging(const std::string& level) {
@@ -153,6 +228,10 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
 
   FitCommandOptions fit_options;
   CLI::App* fit = add_fit(app, fit_options);
+  MarginsOptions margins_options;
+  CLI::App* margins = add_margins(app, margins_options);
+  NotchOptions notch_options;
+  CLI::App* notch = add_notch(app, notch_options);
   CompareOptions compare_options;
   CLI::App* comparer = app.add_subcommand(
       "compare", "Tell whether measurements differ by more than their scatter explains");
@@ -195,6 +274,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     if (exporter->parsed()) return export_command(export_options);
     if (reporter->parsed()) return report_command(report_options);
     if (fit->parsed()) return fit_command(fit_options);
+    if (margins->parsed()) return margins_command(margins_options);
+    if (notch->parsed()) return notch_command(notch_options);
     if (comparer->parsed()) return compare_command(compare_options);
     if (list->parsed()) return drivers_command(drivers);
   } catch (const config::ConfigError& error) {

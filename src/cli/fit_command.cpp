@@ -160,7 +160,7 @@ void fit_by_paper(const FitCommandOptions& options, const Measured& measured,
 
 }  // namespace
 
-int fit_command(const FitCommandOptions& options) {
+report::FitReport fit_files(const FitCommandOptions& options) {
   const Measured measured = measure(options);
   const FitInput& first = measured.inputs.front();
   report::FitReport report;
@@ -176,15 +176,20 @@ int fit_command(const FitCommandOptions& options) {
   else
     fit_by_paper(options, measured, report);
 
-  const std::string json = report::fit_json(report);
-  if (options.json)
-    std::cout << json << '\n';
-  else
-    report::print_fit(std::cout, report);
   if (measured.inputs.size() == 1 && first.sweep_file && !options.no_store) {
-    record::store_fit(options.files.front(), first.input, first.output, options.method, json);
+    record::store_fit(options.files.front(), first.input, first.output, options.method,
+                      report::fit_json(report));
     spdlog::info("stored the fit in {}", options.files.front());
   }
+  return report;
+}
+
+int fit_command(const FitCommandOptions& options) {
+  const report::FitReport report = fit_files(options);
+  if (options.json)
+    std::cout << report::fit_json(report) << '\n';
+  else
+    report::print_fit(std::cout, report);
   if (report.fit && !report.fit->converged) {
     spdlog::warn("the fit has not converged: {}", report.fit->reason);
     return exit_failed;

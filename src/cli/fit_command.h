@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "report/fit_report.h"
+
 namespace sinerig::cli {
 
 struct FitCommandOptions {
@@ -29,6 +31,10 @@ struct FitCommandOptions {
   bool no_store = false;
   std::string channel;
 };
+
+// Fits what the options name; a fit of one sweep file is stored in it unless no_store is set.
+// Throws as fit_command does.
+report::FitReport fit_files(const FitCommandOptions& options);
 
 // Prints the model; a fit of one sweep file is also stored in it. Throws std::invalid_argument,
 // InputError and record::SweepFileError. Exit code 1 when the fit has not converged.

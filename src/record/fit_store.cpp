@@ -29,4 +29,17 @@ void store_fit(const std::string& path, std::uint32_t input, std::uint32_t outpu
   insert.bind(input, output, method, json).run();
 }
 
+std::optional<std::string> last_fit(const std::string& path, std::uint32_t input,
+                                    std::uint32_t output) {
+  Database database{path, Database::Mode::read};
+  Statement table{database, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = 'fit'"};
+  if (!table.step()) return std::nullopt;
+  Statement latest{database,
+                   "SELECT json FROM fit WHERE input = ? AND output = ? AND method = 'ml' "
+                   "ORDER BY id DESC LIMIT 1"};
+  latest.bind(input, output);
+  if (!latest.step()) return std::nullopt;
+  return latest.text(0);
+}
+
 }  // namespace sinerig::record

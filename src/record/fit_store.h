@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 namespace sinerig::record {
@@ -11,5 +12,10 @@ namespace sinerig::record {
 // Throws SweepFileError.
 void store_fit(const std::string& path, std::uint32_t input, std::uint32_t output,
                const std::string& method, const std::string& json);
+
+// The json of the latest fit of that pair of channels by maximum likelihood, the one with error
+// bars; nothing when there is none. Throws SweepFileError.
+std::optional<std::string> last_fit(const std::string& path, std::uint32_t input,
+                                    std::uint32_t output);
 
 }  // namespace sinerig::record

@@ -170,9 +170,14 @@ void print_fit(std::ostream& stream, const FitReport& report) {
 }
 
 std::string fit_json(const FitReport& report) {
-  Json json{{"label", report.label},   {"method", report.method},         {"num", report.model.num},
-            {"den", report.model.den}, {"delay_s", report.model.delay_s}, {"chi2", nullptr},
-            {"converged", true}};
+  Json json{{"label", report.label},
+            {"method", report.method},
+            {"num", report.model.num},
+            {"den", report.model.den},
+            {"delay_s", report.model.delay_s},
+            {"chi2", nullptr},
+            {"converged", true},
+            {"hold_period_s", report.hold_period_s}};
   if (report.fit) {
     json["chi2"] = report.fit->chi2;
     json["converged"] = report.fit->converged;

@@ -1,0 +1,61 @@
+#include "cli/margins_command.h"
+
+#include <iostream>
+#include <stdexcept>
+
+#include <nlohmann/json.hpp>
+
+#include "cli/commands.h"
+#include "identify/loop_analysis.h"
+#include "identify/loop_conversions.h"
+#include "report/loop_report.h"
+
+namespace sinerig::cli {
+
+int margins_command(const MarginsOptions& options) {
+  const identify::LoopSignal signal = identify::loop_signal(options.response);
+  const bool plant = signal == identify::LoopSignal::plant;
+  if (!plant && has_controller(options.loop))
+    throw std::invalid_argument("--response " + options.response +
+                                " holds the controller already; leave it out");
+  const FitInput measured = read_fit_input(options.file, options.channel);
+  identify::check_response(measured.response, 2);
+  const identify::Curve points =
+      plant ? measured_loop(options.loop, measured)
+            : identify::loop_from(identify::Curve::of_points(measured.response), signal);
+  const identify::LoopFigures of_points = identify::analyse_loop(points);
+
+  const double rate_hz = plant ? loop_rate_hz(options.loop, measured) : 0.0;
+  nlohmann::ordered_json json{{"label", measured.label},
+                              {"response", options.response},
+                              {"controller", controller_text(options.loop)},
+                              {"rate_hz", rate_hz},
+                              {"points", report::loop_json(of_points, std::nullopt)},
+                              {"model", nullptr}};
+  if (!options.json) {
+    std::cout << measured.label << ", " << controller_text(options.loop);
+    if (rate_hz > 0.0) std::cout << " at " << rate_hz << " Hz";
+    std::cout << "; in brackets 95 % intervals\n\n";
+  }
+  if (plant && !options.points_only) {
+    const PlantModel model = read_plant_model(options.file, options.channel, options.refit);
+    std::optional<bool> stable;
+    if (options.loop.controller_file.empty())
+      stable = model_loop(options.loop, model).closed_loop_stable();
+    const identify::LoopFigures of_model =
+        identify::analyse_loop(model_curve(options.loop, model), stable);
+    json["model"] = report::loop_json(of_model, stable);
+    if (!options.json) {
+      report::print_loop(std::cout, "model", of_model, stable);
+      std::cout << '\n';
+    }
+  }
+  if (options.json)
+    std::cout << json.dump(2) << '\n';
+  else
+    report::print_loop(std::cout, "points (their scatter only, not what lies between neighbours)",
+                       of_points, std::nullopt);
+  return exit_done;
+}
+
+}  // namespace sinerig::cli

@@ -1,0 +1,29 @@
+// The model of a plant that margins and notches start from: the fit stored in a sweep file, or a
+// new one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "cli/fit_input.h"
+#include "identify/fit.h"
+#include "identify/loop_curve.h"
+
+namespace sinerig::cli {
+
+struct PlantModel {
+  FitInput measured;
+  identify::ZerosPolesGain zpk;
+  std::vector<identify::Mode> modes;  // frequency, damping and pole only
+  identify::Response band;            // G(jω) of the model with its covariance, where measured
+
+  // Relative scatter of G, straight over ln ω between the frequencies of the band, held beyond.
+  identify::Curve::Scatter scatter() const;
+};
+
+// FILE is a sweep file or CSV. Its latest maximum-likelihood fit is used; without one, or with
+// refit, it is fitted first with `sinerig fit`'s defaults, and that is said (and stored in a sweep
+// file). Throws as fit_command does.
+PlantModel read_plant_model(const std::string& file, const std::string& channel, bool refit);
+
+}  // namespace sinerig::cli

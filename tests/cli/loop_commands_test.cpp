@@ -1,0 +1,257 @@
+// From a sweep of config/gimbal.toml to a notch, each step against the plant of that file.
+#include <array>
+#include <cmath>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "identify/biquad.h"
+#include "identify/discrete.h"
+#include "identify/loop_model.h"
+#include "sim/linear_system.h"
+#include "sim/plant.h"
+#include "support/program.h"
+
+namespace sinerig {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+
+constexpr double rate_hz = 1000.0;
+constexpr double turn = 2.0 * 3.14159265358979323846;
+constexpr std::array<double, 4> pid{3.0, 3.0, 0.15, 10.0};
+const std::string pid_option = " --pid 3,3,0.15,10";
+
+sim::LinearSystem gimbal() {
+  sim::MechanicalAxis axis;
+  axis.inertia = 0.02;
+  axis.damping = 0.1005;
+  axis.lag_hz = 150.0;
+  axis.modes = {{23.0, 0.01, 30.66}, {90.0, 0.01, 36.89}};
+  sim::LinearSystem system = sim::from_mechanical_axis(axis);
+  system.dead_time_s = 0.0015;
+  return system;
+}
+
+// y = num/den u, descending powers of z, den monic.
+class Filter {
+ public:
+  Filter(std::vector<double> num, std::vector<double> den)
+      : num_(std::move(num)), den_(std::move(den)), u_(den_.size()), y_(den_.size()) {
+    num_.insert(num_.begin(), den_.size() - num_.size(), 0.0);
+  }
+  double step(double input) {
+    for (std::size_t i = u_.size() - 1; i > 0; --i) {
+      u_[i] = u_[i - 1];
+      y_[i] = y_[i - 1];
+    }
+    u_[0] = input;
+    y_[0] = 0.0;
+    for (std::size_t i = 0; i < num_.size(); ++i) y_[0] += num_[i] * u_[i] - den_[i] * y_[i];
+    return y_[0];
+  }
+
+ private:
+  std::vector<double> num_;
+  std::vector<double> den_;
+  std::vector<double> u_;
+  std::vector<double> y_;
+};
+
+// Whether a kick of the exact plant dies away under gain · PID · notches.
+bool settles(double gain, const std::vector<Filter>& notches) {
+  const identify::DiscreteModel controller =
+      identify::tustin(identify::pid(pid[0], pid[1], pid[2], turn * pid[3]), 1.0 / rate_hz);
+  std::vector<Filter> chain = notches;
+  chain.emplace_back(controller.num(), controller.den());
+  sim::Plant plant(gimbal(), 1.0 / rate_hz);
+  constexpr int ticks = 60000;
+  double early = 0.0;
+  double late = 0.0;
+  std::array<double, 2> y{};
+  for (int n = 0; n < ticks; ++n) {
+    const sim::PlantTime now{static_cast<std::uint64_t>(n), 0.0};
+    plant.sample(now, y);
+    double u = gain * ((n == 0 ? 1.0 : 0.0) - y[0]);
+    for (Filter& filter : chain) u = filter.step(u);
+    plant.apply(u, now);
+    if (!(std::abs(y[1]) < 1e6)) return false;
+    if (n > ticks / 4 && n < ticks / 2) early = std::max(early, std::abs(y[1]));
+    if (n > 3 * ticks / 4) late = std::max(late, std::abs(y[1]));
+  }
+  return late < early || late < 1e-9;
+}
+
+double simulated_gain_margin_db(const std::vector<Filter>& notches) {
+  double low = -30.0;
+  double high = 60.0;
+  while (high - low > 0.005) {
+    const double middle = 0.5 * (low + high);
+    (settles(std::pow(10.0, middle / 20.0), notches) ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+std::vector<Filter> filters_of(const json& report) {
+  std::vector<Filter> filters;
+  for (const json& notch : report.at("notches"))
+    filters.emplace_back(notch["biquad"]["b"].get<std::vector<double>>(),
+                         notch["biquad"]["a"].get<std::vector<double>>());
+  return filters;
+}
+
+class GimbalSweep : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    workshop_ = std::make_unique<test::Workshop>();
+    const auto run = workshop_->sinerig("run " SINERIG_SOURCE_DIR
+                                        "/config/gimbal.toml -o gimbal.sweep --no-report");
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    const auto fit = workshop_->sinerig("fit gimbal.sweep --json");
+    ASSERT_EQ(fit.exit_code, 0) << fit.errors;
+    fit_ = json::parse(fit.output);
+  }
+  static void TearDownTestSuite() { workshop_.reset(); }
+
+  static json run_json(const std::string& arguments) {
+    const auto run = workshop_->sinerig(arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return json::parse(run.output, nullptr, false);
+  }
+
+  static std::unique_ptr<test::Workshop> workshop_;
+  static json fit_;
+};
+
+std::unique_ptr<test::Workshop> GimbalSweep::workshop_;
+json GimbalSweep::fit_;
+
+void expect_inside_its_interval(const json& estimate, double truth, double tolerance) {
+  const double value = estimate.at("value").get<double>();
+  EXPECT_NEAR(value, truth, tolerance);
+  EXPECT_NEAR(value, truth, 1.96 * estimate.at("standard_error").get<double>());
+}
+
+TEST_F(GimbalSweep, FitRecoversThePlant) {
+  int found = 0;
+  for (const json& mode : fit_.at("modes")) {
+    if (mode["pole"][1].get<double>() == 0.0) continue;
+    const double truth_hz = ++found == 1 ? 23.0 : 90.0;
+    expect_inside_its_interval(mode["frequency_hz"], truth_hz, 1e-3 * truth_hz);
+    expect_inside_its_interval(mode["damping"], 0.01, 0.05 * 0.01);
+  }
+  EXPECT_EQ(found, 2);
+  EXPECT_NEAR(fit_.at("delay_s").get<double>(), 0.0015, 20e-6);
+  EXPECT_NEAR(fit_.at("delay_s").get<double>(), 0.0015,
+              1.96 * fit_.at("delay_standard_error").get<double>());
+  EXPECT_TRUE(fit_.at("converged").get<bool>());
+}
+
+TEST_F(GimbalSweep, MarginsOfModelAreThoseOfTheSimulation) {
+  const json margins = run_json("margins gimbal.sweep --json" + pid_option);
+  EXPECT_TRUE(margins["model"]["stable"].get<bool>());
+  EXPECT_EQ(margins["rate_hz"].get<double>(), rate_hz);
+  const json& margin = margins["model"]["gain_margin"]["margin_db"];
+  const double simulated_db = simulated_gain_margin_db({});
+  EXPECT_NEAR(margin["value"].get<double>(), simulated_db, 0.1);
+  EXPECT_LT(margin["low"].get<double>(), margin["high"].get<double>());
+  // The points see the crossover as the model does.
+  const double model_deg = margins["model"]["phase_margin"]["margin_deg"]["value"].get<double>();
+  const double points_deg = margins["points"]["phase_margin"]["margin_deg"]["value"].get<double>();
+  EXPECT_NEAR(points_deg, model_deg, 1.0);
+  EXPECT_EQ(margins["points"]["phase_margin"]["interpolated_between_hz"].size(), 2U);
+}
+
+TEST_F(GimbalSweep, NotchRaisesTheGainMarginAsStated) {
+  const json report = run_json("notch gimbal.sweep --json" + pid_option);
+  const json& notch = report.at("notches").at(0);
+  EXPECT_NEAR(notch["frequency_hz"].get<double>(), 23.0, 0.023);
+  EXPECT_GE(notch["worst_attenuation_db"].get<double>(), notch["attenuation_db"].get<double>());
+  const double before_db = report["before"]["gain_margin"]["margin_db"]["value"].get<double>();
+  const double after_db = report["after"]["gain_margin"]["margin_db"]["value"].get<double>();
+  EXPECT_TRUE(report["after"]["stable"].get<bool>());
+  EXPECT_GT(after_db, before_db + 3.0);
+  const double simulated_before_db = simulated_gain_margin_db({});
+  const double simulated_after_db = simulated_gain_margin_db(filters_of(report));
+  EXPECT_NEAR(before_db, simulated_before_db, 0.1);
+  EXPECT_NEAR(after_db, simulated_after_db, 0.1);
+  RecordProperty("raised_db", std::to_string(simulated_after_db - simulated_before_db));
+  // The stated phase cost is what the crossover loses.
+  const double cost_deg = notch["phase_cost_deg"].get<double>();
+  EXPECT_GT(cost_deg, 0.0);
+  EXPECT_LT(cost_deg, 15.0);
+}
+
+TEST_F(GimbalSweep, NotchesInCascadeAndForDrift) {
+  const json both = run_json("notch gimbal.sweep --at 90,23 --json" + pid_option);
+  ASSERT_EQ(both["notches"].size(), 2U);
+  EXPECT_NEAR(both["notches"][1]["frequency_hz"].get<double>(), 90.0, 0.1);
+  EXPECT_TRUE(both["after"]["stable"].get<bool>());
+  EXPECT_NEAR(both["after"]["gain_margin"]["margin_db"]["value"].get<double>(),
+              simulated_gain_margin_db(filters_of(both)), 0.1);
+  const json one = run_json("notch gimbal.sweep --attenuation 20 --json");
+  const json drifting = run_json("notch gimbal.sweep --attenuation 20 --within 0.5 --json");
+  EXPECT_GT(drifting["notches"][0]["width_hz"].get<double>(),
+            2.0 * one["notches"][0]["width_hz"].get<double>());
+  EXPECT_TRUE(one["before"].is_null());
+}
+
+TEST_F(GimbalSweep, NotchPrintsCoefficientsForPeopleAndCompilers) {
+  const auto text = workshop_->sinerig("notch gimbal.sweep" + pid_option);
+  EXPECT_THAT(text.output, HasSubstr("notch at 2"));
+  EXPECT_THAT(text.output, HasSubstr("phase cost"));
+  const auto source = workshop_->sinerig("notch gimbal.sweep --at 23,90 --format c");
+  ASSERT_EQ(source.exit_code, 0) << source.errors;
+  EXPECT_THAT(source.output, HasSubstr("static const double notch[2][5] = {"));
+  workshop_->write("notch.c",
+                   "#include <stdint.h>\n" + source.output +
+                       "int main(void) { return notch[0][0] * 1073741824.0 - notch_fixed[0][0] > "
+                       "0.6; }\n");
+  if (workshop_->shell("command -v cc").exit_code == 0) {
+    const auto compiled = workshop_->shell("cc -Wall -Werror notch.c -o notch && ./notch");
+    EXPECT_EQ(compiled.exit_code, 0) << compiled.errors;
+  }
+}
+
+TEST_F(GimbalSweep, RefusesWhatCannotBeHad) {
+  const auto refuses = [](const std::string& arguments, const std::string& message) {
+    const auto run = workshop_->sinerig(arguments);
+    EXPECT_EQ(run.exit_code, 2) << arguments;
+    EXPECT_THAT(run.errors, HasSubstr(message));
+  };
+  refuses("notch gimbal.sweep --at 40", "the model has no resonance near 40 Hz; it has 2");
+  refuses("notch gimbal.sweep --fixed 1.31", "does not fit Q1.31");
+  refuses("notch gimbal.sweep --attenuation -3", "the attenuation must be above 0 dB");
+  refuses("notch gimbal.sweep --crossover 40",
+          "the crossover must lie between 0 and the resonance");
+  refuses("margins gimbal.sweep --pid 1,2", "--pid: wanted KP,KI,KD");
+  refuses("margins gimbal.sweep --controller-num 1,2", "belong together");
+  refuses("margins gimbal.sweep --pid 1,2,3", "filter its derivative");
+  refuses("margins gimbal.sweep --response loop --pid 1,2,3,40", "holds the controller already");
+}
+
+TEST(MarginsCommand, FitsFirstAndSaysSo) {
+  const test::Workshop workshop;
+  std::string csv;
+  for (int i = 0; i < 30; ++i) {
+    const double hz = 0.1 * std::pow(100.0, i / 29.0);
+    const std::complex<double> s{0.0, turn * hz};
+    const std::complex<double> H = 10.0 / (s * (1.0 + 0.02 * s)) * std::exp(-0.01 * s);
+    csv += std::to_string(hz) + "," + std::to_string(H.real()) + "," + std::to_string(H.imag()) +
+           "," + std::to_string(1e-3 * std::abs(H)) + "\n";
+  }
+  workshop.write("axis.csv", csv);
+  const auto run = workshop.sinerig("margins axis.csv");
+  EXPECT_EQ(run.exit_code, 0) << run.errors;
+  EXPECT_THAT(run.errors, HasSubstr("axis.csv holds no fit; fitting it first"));
+  EXPECT_THAT(run.output, HasSubstr("model: closed loop stable"));
+  EXPECT_THAT(run.output, HasSubstr("interpolated between"));
+}
+
+}  // namespace
+}  // namespace sinerig
