@@ -158,7 +158,12 @@ ImportedResponse read_csv(const std::string& path) {
       check_columns(columns, place);
       if (headed) continue;
     }
-    response.points.push_back(point_of(Row{columns, std::move(fields), place}));
+    const Row row{columns, std::move(fields), place};
+    if (response.points.empty()) {
+      if (row.has("input")) response.input = {row.text("input"), row.text("input_unit")};
+      if (row.has("output")) response.output = {row.text("output"), row.text("output_unit")};
+    }
+    response.points.push_back(point_of(row));
     if (!(response.points.back().frequency_hz > 0.0))
       throw SweepFileError(place + ": the frequency has to be above zero");
   }

@@ -118,12 +118,9 @@ Json timing_json(const StoredRun& run) {
 void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response) {
   const ChannelInfo& input = run.channels.at(response.input);
   const ChannelInfo& output = run.channels.at(response.output);
-  stream << "# output: " << output.name << " [" << output.unit << "]\n# input: " << input.name
-         << " [" << input.unit << "]\n# " << response_convention
-         << "\n# re, im, var_*: in output per input; frequencies in Hz; half widths are 95 %\n"
-         << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im";
+  stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im";
   for (const PointColumn& column : point_columns) stream << ',' << column.name;
-  stream << ",status,reason,input,output\n";
+  stream << ",status,reason,input,output,input_unit,output_unit\n";
   const std::vector<double> phase = unwrapped_phase(response.points);
   for (std::size_t i = 0; i < response.points.size(); ++i) {
     const StoredPoint& point = response.points[i];
@@ -134,8 +131,8 @@ void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse&
       stream << field(value) << ',';
     }
     for (const PointColumn& column : point_columns) stream << field(point.*column.value) << ',';
-    stream << point.status << ',' << point.reason << ',' << input.name << ',' << output.name
-           << '\n';
+    stream << point.status << ',' << point.reason << ',' << input.name << ',' << output.name << ','
+           << input.unit << ',' << output.unit << '\n';
   }
 }
 

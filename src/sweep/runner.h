@@ -26,8 +26,8 @@ struct RunControl {
 };
 
 struct RunnerSettings {
-  Pairs responses;                     // empty: every sensor over what was applied
-  std::vector<std::size_t> readbacks;  // sensors that read the excitation back
+  Pairs responses{};                     // empty: every sensor over what was applied
+  std::vector<std::size_t> readbacks{};  // sensors that read the excitation back
   bool record_samples = false;
   double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
   double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
