@@ -128,8 +128,8 @@ class Selector {
  private:
   struct Trial {
     OrderCandidate candidate;
-    double delay_s;
-    bool settled;
+    double delay_s = 0.0;
+    bool settled = false;
   };
 
   double values() const { return static_cast<double>(2 * response_.size()); }
