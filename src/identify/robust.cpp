@@ -69,7 +69,7 @@ ArrayXd redescending_trust(const ArrayXd& size) {
 struct Candidate {
   GridRational rational;
   ArrayXd squared;
-  double trimmed_cost;
+  double trimmed_cost = 0.0;
 };
 
 // D_prev and trust are carried along a profile of delays.

@@ -41,7 +41,9 @@ TEST(ShippedFiles, HoldAtLeastTheFourThatTheManualNames) {
                          {"chebyshev.toml", "gimbal.toml", "servo.toml", "two-mass.toml"}));
 }
 
-std::vector<DriverKit> drivers() { return {sim::sim_driver(), can::can_driver()}; }
+std::vector<DriverKit> drivers() {
+  return {sim::sim_driver(), can::can_driver()};
+}
 
 class ShippedFile : public testing::TestWithParam<std::string> {};
 
@@ -63,9 +65,9 @@ TEST_P(ShippedFile, AcceptsEveryCommentedKeyAtTheDefaultThatItShows) {
     // These two stand in place of other keys; chebyshev.toml shows a second kind of plant, the CAN
     // rig a channel without a profile.
     const std::string key = commented ? match[1].str() : "";
-    const bool alternative =
-        key == "amplitude_table" || key == "frequencies_hz" ||
-        GetParam().ends_with("byshev.toml") || text.find("driver = \"can\"") != std::string::npos;
+    const bool alternative = key == "amplitude_table" || key == "frequencies_hz" ||
+                             GetParam().ends_with("byshev.toml") ||
+                             text.find("driver = \"can\"") != std::string::npos;
     if (commented && !alternative) {
       std::string edited = text;
       edited.erase(offset, 2);
@@ -177,9 +179,9 @@ void expect_exact(const test::ConfiguredRun& run, std::uint16_t output,
 
 std::string noiseless(const std::string& name, const std::string& settle_s) {
   std::string text = test::without_keys(
-      text_of(shipped(name)),
-      {"noise_rms", "pink_noise_rms", "quantum", "bias", "drift_per_s", "backlash", "clip_min",
-       "clip_max", "bias_amplitude", "bias_hz", "coulomb_friction", "breakaway_friction", "stribeck_velocity"});
+      text_of(shipped(name)), {"noise_rms", "pink_noise_rms", "quantum", "bias", "drift_per_s",
+                               "backlash", "clip_min", "clip_max", "bias_amplitude", "bias_hz",
+                               "coulomb_friction", "breakaway_friction", "stribeck_velocity"});
   text = test::without_keys(
       text, {"settling", "settle_cycles", "settle_s", "settle_max_cycles", "settle_max_s",
              "integrate_cycles", "integrate_s", "target_db", "target_deg"});
