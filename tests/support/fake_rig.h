@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "drivers/driver.h"
+#include "support/outside_the_loop.h"
 #include "sweep/clock.h"
 
 namespace sinerig::test {
@@ -48,6 +49,7 @@ class FakeActuator final : public Actuator {
       : clock_{clock}, neutral_{neutral} {}
 
   Sample write(double command) noexcept override {
+    const OutsideTheLoop noting_down;
     writes.push_back({.tick = clock_.now().tick, .command = command});
     last = command;
     released = false;
