@@ -12,7 +12,7 @@ namespace {
 // A dwell that gaps keep from finishing is given up at this many times its planned length.
 constexpr std::uint64_t max_dwell_stretch = 4;
 
-// The transient of a dwell's beginning is not to be taken for a wrong sign.
+// The transient of a dwell's beginning is not to be taken for a wrong sign of a read-back.
 constexpr std::uint32_t blocks_before_check = 2;
 
 std::size_t most_tones(const SweepPlan& plan) {
@@ -190,7 +190,7 @@ void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
     measurement_.add(excitation_.phasors(), observations_);
     if (measurement_.block_ended()) {
       put_block(tick);
-      if (blocks_ == blocks_before_check) check_excitation(tick);
+      if (blocks_ <= blocks_before_check) check_excitation(tick);
     }
   }
   given_up_ = dwell_ticks_ >= max_dwell_stretch * dwell.max_samples;
@@ -262,6 +262,7 @@ void SweepRunner::check_excitation(std::uint64_t tick) noexcept {
                          excitation_.commanded(tone), settings_.min_excitation),
            no_sensor);
   }
+  if (blocks_ < blocks_before_check) return;
   for (const std::size_t sensor : settings_.readbacks) {
     double tone_power = 0.0;
     for (std::size_t tone = 0; tone < tones; ++tone) {

