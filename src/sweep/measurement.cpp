@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -86,8 +87,12 @@ void Measurement::start(const Dwell& dwell) noexcept {
   for (std::uint32_t order = 2; order <= dwell.harmonics; ++order)
     omega_[bin++] = order * omega_[0];
   if (dwell.bias_hz > 0.0) omega_[bin++] = 2.0 * std::numbers::pi * dwell.bias_hz;
-  regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
-                    static_cast<double>(dwell.block_samples));
+  // Over whole cycles a drift is not orthogonal to the harmonics of a clamped or quantised command;
+  // a fixed window keeps to the plain sums of the definition, which are.
+  const double drift_samples = judgement_.settling == Settling::fixed
+                                   ? std::numeric_limits<double>::infinity()
+                                   : static_cast<double>(dwell.block_samples);
+  regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_, drift_samples);
   std::fill(results_.begin(), results_.end(), Result{});
   restart();
 }

@@ -18,8 +18,8 @@ bool NormalSolver::factor(std::span<const double> gram, std::size_t order) noexc
   order_ = order;
   for (std::size_t i = 0; i < order; ++i) {
     const double diagonal = gram[triangle(i) + i];
-    if (!(diagonal > 0.0)) return false;
-    scale_[i] = 1.0 / std::sqrt(diagonal);
+    if (!(diagonal >= 0.0)) return false;
+    scale_[i] = diagonal > 0.0 ? 1.0 / std::sqrt(diagonal) : 0.0;
   }
   for (std::size_t i = 0; i < order; ++i) {
     double* row_i = &factor_[triangle(i)];
@@ -28,8 +28,9 @@ bool NormalSolver::factor(std::span<const double> gram, std::size_t order) noexc
       double sum = gram[triangle(i) + j] * scale_[i] * scale_[j];
       for (std::size_t k = 0; k < j; ++k) sum -= row_i[k] * row_j[k];
       if (i == j) {
-        if (!(sum > smallest_pivot)) return false;
-        row_i[i] = std::sqrt(sum);
+        const bool absent = scale_[i] == 0.0;
+        if (!absent && !(sum > smallest_pivot)) return false;
+        row_i[i] = absent ? 1.0 : std::sqrt(sum);
       } else {
         row_i[j] = sum / row_j[j];
       }

@@ -30,7 +30,8 @@ class NormalSolver {
  public:
   explicit NormalSolver(std::size_t max_order);
 
-  // Factors the Gram matrix, columns scaled. False where the window does not determine the
+  // Factors the Gram matrix, columns scaled. A regressor that was zero throughout is absent: its
+  // coefficient is zero. False where the window does not determine the
   // regressors (a pivot below 1e-11 of its diagonal).
   bool factor(std::span<const double> gram, std::size_t order) noexcept SINERIG_NONBLOCKING;
 
