@@ -93,10 +93,7 @@ TEST(Statistics, IntervalsCoverColouredNoise) {
 
 TEST(Statistics, LostSamplesAndDriftLeaveNoBias) {
   SweepSettings sweep = ten_points();
-  sweep.settling = Settling::fixed;
   sweep.settle = {.cycles = 1.0, .seconds = 1.0};
-  sweep.target_db = 0.0;
-  sweep.target_deg = 0.0;
   auto rig = rig_of(1);
   rig.sensors[0].imperfections.lost_fraction = 0.05;
   rig.sensors[0].imperfections.drift_per_s = 50.0;
