@@ -167,6 +167,7 @@ report::FitReport fit_files(const FitCommandOptions& options) {
   report.method = options.method;
   report.response = measured.response;
   report.hold_period_s = measured.hold_period_s;
+  report.path_delay_s = options.path_delay_s;
   report.label = first.label;
   for (std::size_t i = 1; i < measured.inputs.size(); ++i)
     report.label += " and " + measured.inputs[i].label;

@@ -11,7 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "identify/scatter.h"
-#include "record/sweep_reader.h"
+#include "record/measured.h"
 
 namespace sinerig::cli {
 
@@ -27,8 +27,8 @@ bool is_sweep_file(const std::string& path) {
   return magic == "SQLite format 3";
 }
 
-FitInput from_sweep(const std::string& path, const std::string& channel) {
-  const record::StoredRun run = record::read_sweep(path);
+FitInput from_run(const record::StoredRun& run, const std::string& path,
+                  const std::string& channel) {
   const auto wanted = std::find_if(run.responses.begin(), run.responses.end(), [&](const auto& r) {
     return channel.empty() || run.channels.at(r.output).name == channel;
   });
@@ -38,14 +38,13 @@ FitInput from_sweep(const std::string& path, const std::string& channel) {
     throw InputError(path + ": has no response of \"" + channel + "\"; it has" + names);
   }
   FitInput input;
-  input.sweep_file = true;
   input.rate_hz = run.plan.rate_hz;
   input.input = wanted->input;
   input.output = wanted->output;
   input.label = run.channels.at(wanted->input).name + " to " + run.channels.at(wanted->output).name;
   std::vector<double> degrees_of_freedom;
   for (const record::StoredPoint& point : wanted->points) {
-    if (point.status != "good") continue;
+    if (point.status != "good" && point.status != "imported") continue;
     const bool scatter = point.dof > 0.0;
     input.response.push_back(
         {turn * point.frequency_hz, point.response, scatter ? point.covariance.re_re : 0.0,
@@ -54,7 +53,9 @@ FitInput from_sweep(const std::string& path, const std::string& channel) {
   }
   const std::size_t left_out = wanted->points.size() - degrees_of_freedom.size();
   if (left_out > 0) spdlog::warn("{} points are not good and are left out", left_out);
-  input.response = identify::pooled_scatter(input.response, degrees_of_freedom);
+  const bool pooled = std::all_of(degrees_of_freedom.begin(), degrees_of_freedom.end(),
+                                  [](double dof) { return std::isfinite(dof); });
+  if (pooled) input.response = identify::pooled_scatter(input.response, degrees_of_freedom);
   return input;
 }
 
@@ -127,7 +128,7 @@ class CsvReader {
     if (fields.size() < 3) refuse("fewer than three columns; wanted freq_hz,re,im[,std]");
     const auto status = columns_.find("status");
     if (status != columns_.end() && status->second < fields.size() &&
-        fields[status->second] != "good")
+        fields[status->second] != "good" && fields[status->second] != "imported")
       return;
     const double nan = std::nan("");
     const double deviation = number(fields, "std", 0.0);
@@ -160,7 +161,15 @@ class CsvReader {
 }  // namespace
 
 FitInput read_fit_input(const std::string& path, const std::string& channel) {
-  return is_sweep_file(path) ? from_sweep(path, channel) : CsvReader{path}.read();
+  if (is_sweep_file(path)) {
+    FitInput input = from_run(record::read_sweep(path), path, channel);
+    input.sweep_file = true;
+    return input;
+  }
+  for (const char* extension : {".mat", ".uff", ".unv"}) {
+    if (path.ends_with(extension)) return from_run(record::read_measured(path), path, channel);
+  }
+  return CsvReader{path}.read();
 }
 
 }  // namespace sinerig::cli

@@ -1,4 +1,4 @@
-// Where a fit gets its response from: a sweep file or a CSV file.
+// Where a fit gets its response from: a sweep file, or one measured elsewhere.
 #pragma once
 
 #include <stdexcept>
@@ -24,10 +24,10 @@ struct FitInput {
 };
 
 // A sweep file: the good points of the channel (the first sensor where it is empty), scatter pooled
-// over neighbours. Anything else: CSV, either with a header that names freq_hz, re, im and
-// optionally std or var_re, cov_re_im, var_im and status, or without one: freq_hz, re, im[, std].
-// std is that of each of re and im. Lines that start with # are skipped.
-// Throws InputError and record::SweepFileError.
+// over neighbours. .mat, .uff and .unv: the same, as read_measured reads them. Anything else: CSV,
+// either with a header that names freq_hz, re, im and optionally std or var_re, cov_re_im, var_im
+// and status, or without one: freq_hz, re, im[, std]. std is that of each of re and im. Lines that
+// start with # are skipped. Throws InputError and record::SweepFileError.
 FitInput read_fit_input(const std::string& path, const std::string& channel);
 
 }  // namespace sinerig::cli

@@ -153,15 +153,19 @@ std::vector<StoredFit> read_fits(Database& database) {
                   .den = numbers(row.value("den", Json::array())),
                   .delay_s = number_at(row, "delay_s"),
                   .hold_period_s = number_at(row, "hold_period_s"),
+                  .path_delay_s = number_at(row, "path_delay_s"),
+                  .gain = {},
                   .poles = roots(row.value("poles", Json::array())),
                   .zeros = roots(row.value("zeros", Json::array())),
                   .facts = {}};
     if (fit.num.empty() || fit.den.empty()) continue;
+    if (row.contains("gain") && row["gain"].is_number()) fit.gain = number_at(row, "gain");
     if (row.contains("method")) fit.label = text_of(row["method"]);
     fit.facts.emplace_back("numerator", list_text(row["num"]));
     fit.facts.emplace_back("denominator", list_text(row["den"]));
     for (const auto& [key, value] : row.items()) {
-      if (value.is_primitive() && key != "input" && key != "output" && key != "id")
+      if (value.is_primitive() && key != "input" && key != "output" && key != "id" &&
+          !value.is_null())
         fit.facts.emplace_back(key, text_of(value));
     }
     fits.push_back(std::move(fit));

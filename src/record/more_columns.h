@@ -4,6 +4,7 @@
 
 #include <complex>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,7 +22,9 @@ struct StoredFit {
   std::vector<double> num;  // descending powers of s
   std::vector<double> den;  // descending powers of s
   double delay_s = 0.0;
-  double hold_period_s = 0.0;               // of the zero-order hold in front of it, 0 = none
+  double hold_period_s = 0.0;  // of the zero-order hold in front of it, 0 = none
+  double path_delay_s = 0.0;   // of the measuring path, in the points but not in the model
+  std::optional<double> gain;  // of zeros and poles, where the file holds it
   std::vector<std::complex<double>> poles;  // rad/s; empty where the file does not hold them
   std::vector<std::complex<double>> zeros;
   std::vector<std::pair<std::string, std::string>> facts;  // all that is a single value

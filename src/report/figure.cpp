@@ -74,35 +74,24 @@ Curves curves_of(const StoredResponse& response) {
   return curves;
 }
 
-void draw_models(SvgPanel& gain, SvgPanel& phase, const Curves& curves,
-                 const std::vector<record::StoredFit>& fits) {
-  for (const record::StoredFit& fit : fits) {
-    if (curves.frequency_hz.empty()) return;
-    const std::vector<double> grid =
-        log_grid(curves.frequency_hz.front(), curves.frequency_hz.back(), 500);
-    std::vector<StoredPoint> points(grid.size());
-    std::vector<double> gains;
-    for (std::size_t i = 0; i < grid.size(); ++i) {
-      points[i].response = model_at(fit, grid[i]);
-      gains.push_back(db(std::abs(points[i].response)));
-    }
-    std::vector<double> phases = record::unwrapped_phase(points);
-    const double first = curves.phase_deg.front() / degrees_per_radian;
-    const double turn = 2.0 * std::numbers::pi;
-    const double shift = std::isfinite(first) ? turn * std::round((first - phases[0]) / turn) : 0.0;
-    for (double& each : phases) each = (each + shift) * degrees_per_radian;
-    gain.line(grid, gains, {.stroke = "#1b1f24", .width = 1.5});
-    phase.line(grid, phases, {.stroke = "#1b1f24", .width = 1.5});
+void draw_model(SvgPanel& gain, SvgPanel& phase, const Curves& curves,
+                const record::StoredFit& fit) {
+  const std::vector<double> grid =
+      log_grid(curves.frequency_hz.front(), curves.frequency_hz.back(), 500);
+  const std::vector<std::complex<double>> response = model_response(fit, grid);
+  std::vector<StoredPoint> points(grid.size());
+  std::vector<double> gains;
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    points[i].response = response[i];
+    gains.push_back(db(std::abs(response[i])));
   }
-}
-
-std::vector<record::StoredFit> fits_of(const record::StoredRun& run,
-                                       const StoredResponse& response) {
-  std::vector<record::StoredFit> fits;
-  std::copy_if(run.fits.begin(), run.fits.end(), std::back_inserter(fits), [&](const auto& fit) {
-    return fit.input == response.input && fit.output == response.output;
-  });
-  return fits;
+  std::vector<double> phases = record::unwrapped_phase(points);
+  const double first = curves.phase_deg.front() / degrees_per_radian;
+  const double turn = 2.0 * std::numbers::pi;
+  const double shift = std::isfinite(first) ? turn * std::round((first - phases[0]) / turn) : 0.0;
+  for (double& each : phases) each = (each + shift) * degrees_per_radian;
+  gain.line(grid, gains, {.stroke = "#1b1f24", .width = 1.5});
+  phase.line(grid, phases, {.stroke = "#1b1f24", .width = 1.5});
 }
 
 }  // namespace
@@ -111,10 +100,9 @@ void write_bode_svg(std::ostream& stream, const LabelledRun& labelled,
                     const StoredResponse& response) {
   const record::StoredRun& run = labelled.run;
   const Curves curves = curves_of(response);
-  const std::vector<record::StoredFit> fits = fits_of(run, response);
+  const record::StoredFit* fit = latest_fit(run, response);
   const Axis x = frequency_axis(response);
-  const bool measured_alone = fits.empty();
-  const SvgStyle series{.stroke = "#1f66c1", .width = measured_alone ? 1.3 : 0.6};
+  const SvgStyle series{.stroke = "#1f66c1", .width = fit == nullptr ? 1.3 : 0.6};
 
   const std::string measured_in = response_unit(run, response);
   const std::string unit = measured_in == "1" ? "1" : "1 " + measured_in;
@@ -138,7 +126,7 @@ void write_bode_svg(std::ostream& stream, const LabelledRun& labelled,
   phase.band(curves.frequency_hz, curves.phase_low, curves.phase_high, series);
   phase.line(curves.frequency_hz, curves.phase_deg, series);
   phase.marks(curves.frequency_hz, curves.phase_deg, curves.status, series);
-  draw_models(gain, phase, curves, fits);
+  if (fit != nullptr && !curves.frequency_hz.empty()) draw_model(gain, phase, curves, *fit);
 
   SvgPanel width95{stream,
                    x,

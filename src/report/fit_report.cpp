@@ -177,7 +177,8 @@ std::string fit_json(const FitReport& report) {
             {"delay_s", report.model.delay_s},
             {"chi2", nullptr},
             {"converged", true},
-            {"hold_period_s", report.hold_period_s}};
+            {"hold_period_s", report.hold_period_s},
+            {"path_delay_s", report.path_delay_s}};
   if (report.fit) {
     json["chi2"] = report.fit->chi2;
     json["converged"] = report.fit->converged;

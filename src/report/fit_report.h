@@ -18,6 +18,7 @@ struct FitReport {
   std::string method;  // ml hassul choe
   identify::Response response;
   double hold_period_s = 0.0;  // of the hold in front of the plant when it was measured, 0: none
+  double path_delay_s = 0.0;   // of the measuring path, divided out before the fit
   identify::TransferFunction model;
   std::optional<identify::Fit> fit;
   std::optional<identify::ChoeFit> choe;

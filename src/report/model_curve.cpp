@@ -2,17 +2,63 @@
 
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 
+#include "identify/hold.h"
 #include "identify/transfer_function.h"
 
 namespace sinerig::report {
 
-std::complex<double> model_at(const record::StoredFit& fit, double frequency_hz) {
-  const double omega = 2.0 * std::numbers::pi * frequency_hz;
-  const identify::TransferFunction model{.num = fit.num, .den = fit.den, .delay_s = fit.delay_s};
-  const double half_angle = 0.5 * omega * fit.hold_period_s;
-  const double sinc = half_angle > 0.0 ? std::sin(half_angle) / half_angle : 1.0;
-  return model.at(omega) * std::polar(sinc, -half_angle);
+namespace {
+
+constexpr double turn = 2.0 * std::numbers::pi;
+
+// By its roots where the file has them all: they keep the accuracy that coefficients lose.
+identify::ZerosPolesGain roots_of(const record::StoredFit& fit) {
+  const bool complete = fit.gain && fit.poles.size() + 1 == fit.den.size();
+  const identify::ZerosPolesGain model =
+      complete
+          ? identify::ZerosPolesGain{.zeros = fit.zeros,
+                                     .poles = fit.poles,
+                                     .gain = *fit.gain,
+                                     .delay_s = fit.delay_s}
+          : identify::to_zeros_poles_gain({.num = fit.num, .den = fit.den, .delay_s = fit.delay_s});
+  return model;
+}
+
+}  // namespace
+
+std::vector<std::complex<double>> model_response(const record::StoredFit& fit,
+                                                 const std::vector<double>& frequency_hz) {
+  const identify::ZerosPolesGain model = roots_of(fit);
+  const double period_s = fit.hold_period_s;
+  std::vector<std::complex<double>> response;
+  for (const double each : frequency_hz) {
+    const double omega = turn * each;
+    std::complex<double> value = model.at(omega);
+    if (period_s > 0.0) value *= identify::hold_factor(omega, period_s);
+    response.push_back(value);
+  }
+  const auto count = static_cast<Eigen::Index>(frequency_hz.size());
+  const Eigen::ArrayXd omega = turn * Eigen::Map<const Eigen::ArrayXd>(frequency_hz.data(), count);
+  if (period_s > 0.0 && count > 0 && omega.maxCoeff() * period_s < std::numbers::pi) {
+    try {
+      const Eigen::ArrayXcd held = identify::held_response(model, period_s, omega);
+      response.assign(held.begin(), held.end());
+    } catch (const std::invalid_argument&) {
+      // A model that the exact hold does not cover keeps the factor.
+    }
+  }
+  for (std::size_t i = 0; i < response.size(); ++i)
+    response[i] *= std::polar(1.0, -turn * frequency_hz[i] * fit.path_delay_s);
+  return response;
+}
+
+const record::StoredFit* latest_fit(const record::StoredRun& run,
+                                    const record::StoredResponse& response) {
+  for (auto fit = run.fits.rbegin(); fit != run.fits.rend(); ++fit)
+    if (fit->input == response.input && fit->output == response.output) return &*fit;
+  return nullptr;
 }
 
 std::vector<double> log_grid(double from_hz, double to_hz, std::size_t count) {

@@ -54,19 +54,18 @@ Json model_json(const record::StoredFit& fit, const StoredResponse& response) {
   Json model{{"label", fit.label}, {"f", Json::array()}, {"re", Json::array()}};
   model["im"] = model["at_re"] = model["at_im"] = Json::array();
   std::vector<double> grid;
-  for (const StoredPoint& point : response.points) {
-    grid.push_back(point.frequency_hz);
-    const std::complex<double> value = model_at(fit, point.frequency_hz);
+  for (const StoredPoint& point : response.points) grid.push_back(point.frequency_hz);
+  for (const std::complex<double>& value : model_response(fit, grid)) {
     model["at_re"].push_back(number(value.real(), 9));
     model["at_im"].push_back(number(value.imag(), 9));
   }
   for (const double each : log_grid(grid.front(), grid.back(), curve_points)) grid.push_back(each);
   std::sort(grid.begin(), grid.end());
-  for (const double frequency_hz : grid) {
-    const std::complex<double> value = model_at(fit, frequency_hz);
-    model["f"].push_back(number(frequency_hz, 8));
-    model["re"].push_back(number(value.real(), 7));
-    model["im"].push_back(number(value.imag(), 7));
+  const std::vector<std::complex<double>> curve = model_response(fit, grid);
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    model["f"].push_back(number(grid[i], 8));
+    model["re"].push_back(number(curve[i].real(), 7));
+    model["im"].push_back(number(curve[i].imag(), 7));
   }
   model["facts"] = fit.facts;
   model["poles"] = roots_json(fit.poles);
@@ -76,11 +75,8 @@ Json model_json(const record::StoredFit& fit, const StoredResponse& response) {
 
 Json models_json(const StoredRun& run, const StoredResponse& response) {
   Json models = Json::array();
-  if (response.points.empty()) return models;
-  for (const record::StoredFit& fit : run.fits) {
-    if (fit.input == response.input && fit.output == response.output)
-      models.push_back(model_json(fit, response));
-  }
+  const record::StoredFit* fit = latest_fit(run, response);
+  if (fit != nullptr && !response.points.empty()) models.push_back(model_json(*fit, response));
   return models;
 }
 

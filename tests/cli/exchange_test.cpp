@@ -167,5 +167,25 @@ TEST_F(Exchange, CommandsTakeFilesMeasuredElsewhere) {
   EXPECT_EQ(workshop_.sinerig("export other.csv --format mat").exit_code, 2);
 }
 
+// The plant is of third order with delay: what the report draws is the model that was fitted.
+TEST_F(Exchange, FitTakesEveryFormatAndTheReportDrawsTheModel) {
+  const std::string order = " --poles 3 --zeros 2 --delay fit --json";
+  ASSERT_EQ(workshop_.sinerig("fit axis.sweep" + order).exit_code, 0);
+  ASSERT_EQ(workshop_.sinerig("report axis.sweep").exit_code, 0);
+  EXPECT_THAT(workshop_.read("axis.html"), HasSubstr("\"at_re\":["));
+  const record::StoredRun run = record::read_sweep((workshop_.folder() / "axis.sweep").string());
+  ASSERT_EQ(run.fits.size(), 1U);
+  EXPECT_EQ(run.fits.front().den.size(), 4U);
+  EXPECT_DOUBLE_EQ(run.fits.front().hold_period_s, 1.0 / run.plan.rate_hz);
+  for (const char* format : {"csv", "mat", "uff"}) {
+    const std::string name = std::string{"axis."} + format;
+    workshop_.sinerig(std::string{"export axis.sweep --channel motor --format "} + format + " -o " +
+                      name);
+    const auto fit = workshop_.sinerig("fit " + name + order);
+    EXPECT_EQ(fit.exit_code, 0) << fit.errors;
+    EXPECT_THAT(fit.output, HasSubstr("\"den\""));
+  }
+}
+
 }  // namespace
 }  // namespace sinerig

@@ -104,6 +104,8 @@ inline record::StoredFit lag_fit() {
           .den = {1.0, omega},
           .delay_s = 0.0,
           .hold_period_s = 0.0,
+          .path_delay_s = 0.0,
+          .gain = 2.0 * omega,
           .poles = {-omega},
           .zeros = {},
           .facts = {{"chi2", "1.02"}}};
