@@ -77,7 +77,7 @@ Curves curves_of(const StoredResponse& response) {
 void draw_model(SvgPanel& gain, SvgPanel& phase, const Curves& curves,
                 const record::StoredFit& fit) {
   const std::vector<double> grid =
-      log_grid(curves.frequency_hz.front(), curves.frequency_hz.back(), 500);
+      curve_grid(fit, curves.frequency_hz.front(), curves.frequency_hz.back());
   const std::vector<std::complex<double>> response = model_response(fit, grid);
   std::vector<StoredPoint> points(grid.size());
   std::vector<double> gains;

@@ -1,5 +1,6 @@
 #include "report/model_curve.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -12,6 +13,8 @@ namespace sinerig::report {
 namespace {
 
 constexpr double turn = 2.0 * std::numbers::pi;
+constexpr int curve_steps = 400;
+constexpr int peak_steps = 12;  // quarters of the half-power half-width, to either side
 
 // By its roots where the file has them all: they keep the accuracy that coefficients lose.
 identify::ZerosPolesGain roots_of(const record::StoredFit& fit) {
@@ -61,14 +64,23 @@ const record::StoredFit* latest_fit(const record::StoredRun& run,
   return nullptr;
 }
 
-std::vector<double> log_grid(double from_hz, double to_hz, std::size_t count) {
+std::vector<double> curve_grid(const record::StoredFit& fit, double from_hz, double to_hz) {
   if (!(to_hz > from_hz)) return {from_hz};
   std::vector<double> grid;
-  for (std::size_t i = 0; i < count; ++i) {
-    const double part = static_cast<double>(i) / static_cast<double>(count - 1);
-    grid.push_back(from_hz * std::pow(to_hz / from_hz, part));
-  }
+  for (int i = 0; i <= curve_steps; ++i)
+    grid.push_back(from_hz * std::pow(to_hz / from_hz, static_cast<double>(i) / curve_steps));
   grid.back() = to_hz;
+  const identify::ZerosPolesGain model = roots_of(fit);
+  for (const auto* roots : {&model.poles, &model.zeros}) {
+    for (const std::complex<double>& root : *roots) {
+      if (root.imag() <= 0.0) continue;
+      for (int k = -peak_steps; k <= peak_steps; ++k) {
+        const double each = (root.imag() + 0.25 * k * std::abs(root.real())) / turn;
+        if (each > from_hz && each < to_hz) grid.push_back(each);
+      }
+    }
+  }
+  std::sort(grid.begin(), grid.end());
   return grid;
 }
 

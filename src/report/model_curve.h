@@ -18,7 +18,8 @@ std::vector<std::complex<double>> model_response(const record::StoredFit& fit,
 const record::StoredFit* latest_fit(const record::StoredRun& run,
                                     const record::StoredResponse& response);
 
-// `count` frequencies in equal ratios over the range, ends included; one where both are equal.
-std::vector<double> log_grid(double from_hz, double to_hz, std::size_t count);
+// Frequencies that draw a model from one end of the range to the other: equal ratios, and closer
+// around each lightly damped pole and zero, so that no peak is cut off. Rising.
+std::vector<double> curve_grid(const record::StoredFit& fit, double from_hz, double to_hz);
 
 }  // namespace sinerig::report

@@ -19,9 +19,6 @@ using record::StoredPoint;
 using record::StoredResponse;
 using record::StoredRun;
 
-// Points of a model's curve, besides those that were measured.
-constexpr std::size_t curve_points = 400;
-
 // To so many significant digits; null where there is no number.
 Json number(double value, int digits) {
   if (!std::isfinite(value)) return nullptr;
@@ -59,7 +56,7 @@ Json model_json(const record::StoredFit& fit, const StoredResponse& response) {
     model["at_re"].push_back(number(value.real(), 9));
     model["at_im"].push_back(number(value.imag(), 9));
   }
-  for (const double each : log_grid(grid.front(), grid.back(), curve_points)) grid.push_back(each);
+  for (const double each : curve_grid(fit, grid.front(), grid.back())) grid.push_back(each);
   std::sort(grid.begin(), grid.end());
   const std::vector<std::complex<double>> curve = model_response(fit, grid);
   for (std::size_t i = 0; i < grid.size(); ++i) {
