@@ -108,6 +108,7 @@ MatValue mat_text(const std::string& name, const std::string& text) {
 MatValue mat_texts(const std::string& name, const Dimensions& dimensions,
                    const std::vector<std::string>& texts) {
   std::vector<matvar_t*> cells;
+  cells.reserve(texts.size());
   for (const std::string& text : texts) cells.push_back(mat_text("", text).release());
   return made(name, MAT_C_CELL, MAT_T_CELL, dimensions, cells.data(), 0);
 }

@@ -90,6 +90,7 @@ void write_channels(mat_t* file, const StoredRun& run, const Grid& grid) {
   const auto write = [&](const char* name, const std::vector<std::uint32_t>& channels,
                          std::string ChannelInfo::*part) {
     std::vector<std::string> texts;
+    texts.reserve(channels.size());
     for (const std::uint32_t channel : channels) texts.push_back(run.channels.at(channel).*part);
     Mat_VarWrite(file, mat_texts(name, {channels.size(), 1}, texts).get(), MAT_COMPRESSION_NONE);
   };

@@ -37,7 +37,8 @@ struct Filling {
 };
 
 // One pass over the template, so that a mark inside a filling stays what it is.
-void write_filled(std::ostream& stream, std::string_view page, std::vector<Filling> fillings) {
+void write_filled(std::ostream& stream, std::string_view page,
+                  const std::vector<Filling>& fillings) {
   while (!page.empty()) {
     std::size_t at = page.size();
     const Filling* next = nullptr;

@@ -19,14 +19,9 @@ constexpr int peak_steps = 12;  // quarters of the half-power half-width, to eit
 // By its roots where the file has them all: they keep the accuracy that coefficients lose.
 identify::ZerosPolesGain roots_of(const record::StoredFit& fit) {
   const bool complete = fit.gain && fit.poles.size() + 1 == fit.den.size();
-  const identify::ZerosPolesGain model =
-      complete
-          ? identify::ZerosPolesGain{.zeros = fit.zeros,
-                                     .poles = fit.poles,
-                                     .gain = *fit.gain,
-                                     .delay_s = fit.delay_s}
-          : identify::to_zeros_poles_gain({.num = fit.num, .den = fit.den, .delay_s = fit.delay_s});
-  return model;
+  if (!complete)
+    return identify::to_zeros_poles_gain({.num = fit.num, .den = fit.den, .delay_s = fit.delay_s});
+  return {.zeros = fit.zeros, .poles = fit.poles, .gain = *fit.gain, .delay_s = fit.delay_s};
 }
 
 }  // namespace
@@ -52,16 +47,19 @@ std::vector<std::complex<double>> model_response(const record::StoredFit& fit,
       // A model that the exact hold does not cover keeps the factor.
     }
   }
-  for (std::size_t i = 0; i < response.size(); ++i)
-    response[i] *= std::polar(1.0, -turn * frequency_hz[i] * fit.path_delay_s);
+  std::transform(response.begin(), response.end(), frequency_hz.begin(), response.begin(),
+                 [&](const std::complex<double>& value, double hz) {
+                   return value * std::polar(1.0, -turn * hz * fit.path_delay_s);
+                 });
   return response;
 }
 
 const record::StoredFit* latest_fit(const record::StoredRun& run,
                                     const record::StoredResponse& response) {
-  for (auto fit = run.fits.rbegin(); fit != run.fits.rend(); ++fit)
-    if (fit->input == response.input && fit->output == response.output) return &*fit;
-  return nullptr;
+  const auto found = std::find_if(run.fits.rbegin(), run.fits.rend(), [&](const auto& fit) {
+    return fit.input == response.input && fit.output == response.output;
+  });
+  return found == run.fits.rend() ? nullptr : &*found;
 }
 
 std::vector<double> curve_grid(const record::StoredFit& fit, double from_hz, double to_hz) {
