@@ -226,7 +226,7 @@ bool Measurement::look_for_transient(const Window& window) noexcept {
     TransientBound bound;
     if (tones == 1) {
       bound =
-          transients_.bound(whole.estimate.response, omega_[tone], dwell_->tones[tone].amplitude);
+          transients_.bound(whole.estimate.response, omega_[tone], std::abs(whole.estimate.input));
     }
     const double shift = whole.late.shift;
     const double noise = whole.late.noise;
@@ -297,7 +297,8 @@ void Measurement::conclude() noexcept {
   for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
     if (!evaluate(pair, window)) continue;
     if (pair == 0 && dwell_->tones.size() == 1) {
-      transients_.learn(results_[0].estimate.response, omega_[0], dwell_->tones[0].amplitude);
+      transients_.learn(results_[0].estimate.response, omega_[0],
+                        std::abs(results_[0].estimate.input));
     }
     for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
       Result& each = result(pair, tone);
