@@ -68,6 +68,8 @@ bool WindowEstimator::estimate(const Regression& regression, const Window& windo
                                std::span<const double> omega_rad_s, std::size_t harmonics,
                                std::span<Estimate> estimates) noexcept {
   const std::size_t order = regression.order();
+  tones_ = estimates.size();
+  harmonics_ = harmonics;
   if (!solve(regression, window, pair.input, input_)) return false;
   if (!solve(regression, window, pair.output, output_)) return false;
   const auto length =
@@ -217,18 +219,16 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
   }
 }
 
-namespace {
-
-// Rows of the constant and the tones among all regressors.
-std::size_t plain_row(std::size_t i) noexcept {
-  return i == 0 ? Regression::constant_row : Regression::cosine_row(0) + i - 1;
+// All regressors but the drift and the harmonics.
+std::size_t WindowEstimator::plain_row(std::size_t i) const noexcept {
+  if (i == 0) return Regression::constant_row;
+  const std::size_t skipped = i > 2 * tones_ ? 2 * harmonics_ : 0;
+  return Regression::cosine_row(0) + i - 1 + skipped;
 }
 
-}  // namespace
-
-// The sums in cluster_ on the constant and the tones alone, into plain.
-bool WindowEstimator::fit_plain(std::size_t tones, Plain& plain) noexcept {
-  const std::size_t rows = 1 + 2 * tones;
+// The sums in cluster_ without drift and harmonics, into plain.
+bool WindowEstimator::fit_plain(std::size_t order, Plain& plain) noexcept {
+  const std::size_t rows = order - 1 - 2 * harmonics_;
   if (cluster_.count <= static_cast<double>(rows)) return false;
   for (std::size_t i = 0; i < rows; ++i) {
     for (std::size_t k = 0; k <= i; ++k) {
@@ -243,7 +243,7 @@ bool WindowEstimator::fit_plain(std::size_t tones, Plain& plain) noexcept {
     explained += plain.beta[i] * cluster_.moments[plain_row(i)];
   plain.variance =
       std::max(0.0, cluster_.square - explained) / (cluster_.count - static_cast<double>(rows));
-  for (std::size_t row = 1; row < rows; ++row) {
+  for (std::size_t row = 1; row <= 2 * tones_; ++row) {
     std::fill(column_.begin(), column_.end(), 0.0);
     column_[row] = 1.0;
     plain_solver_.solve(std::span{column_}.first(rows));
@@ -255,12 +255,13 @@ bool WindowEstimator::fit_plain(std::size_t tones, Plain& plain) noexcept {
 bool WindowEstimator::stray(const Regression& regression, const Window& window,
                             std::size_t late_first, const Pair& pair, double most_noise,
                             std::span<const Estimate> estimates, std::span<Stray> strays) noexcept {
+  const std::size_t order = regression.order();
   const std::size_t tones = estimates.size();
   const auto difference = [&](std::size_t channel) {
     regression.window(channel, window.first, window.last, cluster_);
-    if (!fit_plain(tones, whole_)) return false;
+    if (!fit_plain(order, whole_)) return false;
     regression.window(channel, late_first, window.last, cluster_);
-    return fit_plain(tones, late_);
+    return fit_plain(order, late_);
   };
   const auto moved = [&](std::size_t tone) {
     const std::size_t a = 1 + 2 * tone;

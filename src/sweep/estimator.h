@@ -72,9 +72,9 @@ class WindowEstimator {
                 std::span<const double> omega_rad_s, std::size_t harmonics,
                 std::span<Estimate> estimates) noexcept SINERIG_NONBLOCKING;
 
-  // Of the window last estimated, fitted with constant and tones alone: how far its late part, from
-  // checkpoint `late_first` on, strays from the whole. Without the drift and the harmonics, which
-  // in a single cycle would swallow a ringing transient. The noise is that of the late part, but
+  // Of the window last estimated: how far its late part, from checkpoint `late_first` on, strays
+  // from the whole, both fitted without the drift and the harmonics, which in a single cycle would
+  // swallow a ringing transient. The noise is that of the late part, but
   // `most_noise` at most. False where the tones are not determined.
   bool stray(const Regression& regression, const Window& window, std::size_t late_first,
              const Pair& pair, double most_noise, std::span<const Estimate> estimates,
@@ -94,7 +94,7 @@ class WindowEstimator {
     double variance(std::size_t order) const noexcept;
   };
 
-  // … and with constant and tones alone.
+  // … and without drift and harmonics.
   struct Plain {
     std::vector<double> beta;
     std::vector<double> spread;  // variance of each coefficient for a noise of one
@@ -111,11 +111,14 @@ class WindowEstimator {
                      std::span<Estimate> estimates) noexcept;
   double white_influence(std::size_t order, std::size_t tone) noexcept;
   double cluster_residual(std::size_t order) noexcept;
-  bool fit_plain(std::size_t tones, Plain& plain) noexcept;
+  bool fit_plain(std::size_t order, Plain& plain) noexcept;
+  std::size_t plain_row(std::size_t i) const noexcept;
   void influence(const Solution& solution, std::size_t order, std::vector<double>& moved) noexcept;
 
   Solution input_;
   Solution output_;
+  std::size_t tones_ = 0;
+  std::size_t harmonics_ = 0;  // bins that follow the tones
   NormalSums cluster_;
   NormalSolver plain_solver_;
   std::vector<double> plain_gram_;

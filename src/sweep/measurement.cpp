@@ -39,8 +39,9 @@ constexpr double settling_part_of_target = 0.05;
 // of the sweeps of g2 at 80 dB missed 0.1 dB, at 1 one in 20.
 constexpr double window_per_wait = 1.25;
 
-// A shift within the noise may hide this part of it; the rest of the noise is in the variance.
-constexpr double hidden_part = 0.25;
+// A shift within the noise may hide this part of it; the rest of the noise is in the variance. At
+// 0.25 the phase of g1 and g2 at 80 dB was covered 92.7 %, at 0.5 95.1 and 94.5 %.
+constexpr double hidden_part = 0.5;
 
 // Windows of fewer blocks can't tell a fast transient from noise: there the noise is taken to be at
 // most this multiple of the dwell's before.
@@ -226,7 +227,7 @@ bool Measurement::look_for_transient(const Window& window) noexcept {
     TransientBound bound;
     if (tones == 1) {
       bound =
-          transients_.bound(whole.estimate.response, omega_[tone], dwell_->tones[tone].amplitude);
+          transients_.bound(whole.estimate.response, omega_[tone], std::abs(whole.estimate.input));
     }
     const double shift = whole.late.shift;
     const double noise = whole.late.noise;
@@ -297,7 +298,8 @@ void Measurement::conclude() noexcept {
   for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
     if (!evaluate(pair, window)) continue;
     if (pair == 0 && dwell_->tones.size() == 1) {
-      transients_.learn(results_[0].estimate.response, omega_[0], dwell_->tones[0].amplitude);
+      transients_.learn(results_[0].estimate.response, omega_[0],
+                        std::abs(results_[0].estimate.input));
     }
     for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
       Result& each = result(pair, tone);

@@ -86,7 +86,9 @@ int bias(const Options& options) {
       sensor.jitter_s = each.jitter_periods / rate_hz;
       sensor.drift_per_s = each.amplitudes_per_block * std::abs(truth) * rate_hz /
                            static_cast<double>(dwell.block_samples);
-      const auto run = test::run_virtual(plan, rig, test::open_guard(1), {.record_samples = true});
+      RunnerSettings runner;
+      runner.record_samples = true;
+      const auto run = test::run_virtual(plan, rig, test::open_guard(1), runner);
       own[i] = run.sink.points.front().response / truth - 1.0;
       plain[i] = plain_sums(run, dwell) / truth - 1.0;
     });

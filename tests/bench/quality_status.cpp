@@ -109,10 +109,14 @@ std::vector<Planted> planted() {
          rig.sensors[0].imperfections.noise_rms = 1e-3;
        },
        0.0, 1, 1},
-      {"missing excitation", PointStatus::low_signal, PointReason::no_excitation,
+      // These two end the sweep within two blocks; the event says which it was.
+      {"missing excitation", PointStatus::stopped, PointReason::guard_trip,
        [](sim::SimulatedRigSettings& rig) {
-         rig.actuator.min = 0.0;
-         rig.actuator.max = 0.0;
+         rig.actuator.gain = 0.0;
+       }},
+      {"wrong sign", PointStatus::stopped, PointReason::guard_trip,
+       [](sim::SimulatedRigSettings& rig) {
+         rig.actuator.gain = -1.0;
        }},
   };
 }
