@@ -68,11 +68,7 @@ Cost measure(double lost_fraction, double jitter_ns) {
   Pairs pairs;
   for (std::size_t i = 1; i < channels; ++i) pairs.push_back({.input = 0, .output = i});
   Measurement measurement{channels, dwell.bins(), 1, pairs, plan.judgement, rate_hz};
-<<<<<<< HEAD
   Excitation excitation{1, dwell.bins(), Baseline{}};
-=======
-  Excitation excitation{1, dwell.bins(), plan.baseline};
->>>>>>> bd2d9c7 (Fit settling beside the bias motion; check what was applied from the first block on)
   std::mt19937_64 generator{1};
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform;
