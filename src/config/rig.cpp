@@ -249,6 +249,7 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   for (const Channel& sensor : rig.sensors) {
     rig.guard.channels.push_back(read_channel_limits(sensor.section));
   }
+  rig.runner.max_gap_s = loop.number("max_gap_s", {.min = 0.001, .max = 3600.0}, 1.0);
   if (const auto output = file->find("output")) {
     rig.runner.record_samples = output->flag("samples", false);
   }

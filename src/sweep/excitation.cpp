@@ -54,12 +54,13 @@ void Excitation::advance(std::uint64_t ticks) noexcept {
 
 void Excitation::refresh() noexcept {
   for (std::size_t i = 0; i < tones_; ++i) phasors_[i] = voices_[i].phase.phasor();
-  const Phasor& tone = phasors_[0];
+  const Phasor tone = phasors_[0];
   const std::size_t harmonics_end = bins_ - (baseline_.oscillates() ? 1 : 0);
+  Phasor harmonic = tone;
   for (std::size_t i = tones_; i < harmonics_end; ++i) {
-    const Phasor& below = i == tones_ ? tone : phasors_[i - 1];
-    phasors_[i] = {.cosine = below.cosine * tone.cosine - below.sine * tone.sine,
-                   .sine = below.sine * tone.cosine + below.cosine * tone.sine};
+    harmonic = {.cosine = harmonic.cosine * tone.cosine - harmonic.sine * tone.sine,
+                .sine = harmonic.sine * tone.cosine + harmonic.cosine * tone.sine};
+    phasors_[i] = harmonic;
   }
   if (baseline_.oscillates()) {
     oscillation_phasor_ = oscillation_.phasor();

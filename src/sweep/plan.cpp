@@ -98,7 +98,7 @@ void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double
 std::uint32_t part_count(std::uint64_t block_samples) {
   constexpr std::uint64_t shortest_part = 16;
   std::uint32_t parts = 1;
-  while (parts < 8 && block_samples / 2 / parts >= shortest_part) parts *= 2;
+  while (parts < max_parts && block_samples / 2 / parts >= shortest_part) parts *= 2;
   return parts;
 }
 

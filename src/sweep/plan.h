@@ -84,6 +84,8 @@ struct MotionLimits {
   double acceleration_max = unlimited;  // A·ω²
 };
 
+inline constexpr std::uint32_t max_parts = 8;  // that a block is cut into
+
 struct Tone {
   std::uint64_t cycles = 0;  // per block
   double amplitude = 0.0;
