@@ -126,8 +126,8 @@ Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz, co
       std::ceil(std::max(sweep.ramp_s * rate_hz, changes ? samples_per_cycle / 2.0 : 0.0) - 1e-9);
   // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
   const double settle_unit = sweep.settling == Settling::fixed ? base_samples : 1.0;
-  const double settle_samples = settle_unit * std::max(std::ceil(ramp_samples / settle_unit),
-                                                       length(sweep.settle, settle_unit));
+  const double settle_samples =
+      settle_unit * (std::ceil(ramp_samples / settle_unit) + length(sweep.settle, settle_unit));
   const double blocks = std::max(1.0, length(sweep.integrate, block_samples));
   const bool open_ended = sweep.has_target() || sweep.settling == Settling::detect;
   double max_samples = settle_samples + blocks * block_samples;
