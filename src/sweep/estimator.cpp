@@ -196,6 +196,7 @@ void WindowEstimator::take_coefficients(const Pair& pair, std::size_t order, std
     const auto by_input = -estimate.response * input_.turn[tone] / estimate.input;
     estimate.white = sum(estimate.white, multiplied(covariance(input_), by_input));
   }
+  estimate.rms = std::sqrt(output_.sums.square / output_.sums.count);
   estimate.residual_rms = std::sqrt(output_.variance(order));
   estimate.drift_per_block = output_.slope;
 }

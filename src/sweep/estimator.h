@@ -51,6 +51,7 @@ struct Estimate {
   double scatter = 0.0;         // variance of one component of H from the clusters
   double scatter_white = 0.0;   // what that scatter is to white noise of one in the output
   double scatter_dof = 0.0;     // 0: too few clusters
+  double rms = 0.0;             // of the output, all tones
   double residual_rms = 0.0;    // of the output
   double distortion = 0.0;      // of the output: harmonics beyond the noise, relative to the tone
   double own_distortion = 0.0;  // … without those that harmonics of the input may explain

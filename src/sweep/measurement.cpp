@@ -354,9 +354,9 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   point.lost = estimate.lost;
   const double loud = estimate.burst - 1.0;
   const double samples_per_cluster = estimate.samples / (0.5 * estimate.scatter_dof + 1.0);
-  // Above this the residual is the rounding of the running totals (131 dB at 100 kHz), which has no
+  // Below this the residual is the rounding of the running totals (131 dB at 100 kHz), which has no
   // statistics.
-  const bool real_noise = point.snr_db < 120.0;
+  const bool real_noise = estimate.residual_rms > 1e-6 * estimate.rms;
   const bool burst = real_noise && estimate.burst > burst_ratio &&
                      loud > 8.0 * std::sqrt(2.0 / samples_per_cluster);
   const auto mark = [&](PointStatus status, PointReason reason, double value) {

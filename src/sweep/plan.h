@@ -47,6 +47,9 @@ struct SweepSettings {
   std::uint32_t points = 0;
   std::vector<double> frequencies_hz;  // for Spacing::list, in the order to be run
   double frequency_tolerance = 1e-3;   // relative, for the snap to whole cycles in whole samples
+  std::uint32_t tones = 1;             // in one dwell, at most
+  double tones_tolerance = 0.03;       // relative, of the tones above the lowest of a dwell
+  bool odd_bins = false;               // every tone an odd number of cycles in the block
 
   double neutral = 0.0;                         // the command at rest
   double offset = 0.0;                          // from neutral: what the sines are laid on …
