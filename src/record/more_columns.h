@@ -2,6 +2,7 @@
 // the models fitted to a response.
 #pragma once
 
+#include <cstdint>
 #include <complex>
 #include <map>
 #include <optional>
