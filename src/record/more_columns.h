@@ -2,8 +2,8 @@
 // the models fitted to a response.
 #pragma once
 
-#include <cstdint>
 #include <complex>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
