@@ -247,6 +247,9 @@ struct Sweep {
     SweepRunner runner{plan, rig.runner, clock, *device->actuator(), sensors, guard, sink};
     RunControl control;
     outcome = runner.run(control);
+    device.reset();
+    lines.on_set = [](std::uint32_t) {};
+    lines.before_read = [] {};
   }
 
   // The worst point in units of what rounding to whole counts lets through: an error of q / √12
