@@ -248,8 +248,10 @@ struct Sweep {
     RunControl control;
     outcome = runner.run(control);
     device.reset();
-    lines.on_set = [](std::uint32_t) {};
-    lines.before_read = [] {};
+    lines.on_set = [](std::uint32_t) {
+    };
+    lines.before_read = [] {
+    };
   }
 
   // The worst point in units of what rounding to whole counts lets through: an error of q / √12
@@ -309,13 +311,13 @@ TEST(SweepOverLines, OfOneLineGivesTheResponseOfThePlant) {
 }
 
 TEST(SweepOverLines, OfAStepperGivesTheResponseOfThePlant) {
-  Sweep sweep{"output = \"step\"\nline = 0\ndirection_line = 1\nstep = 0.02",
-              small + "\nvelocity_max = 10", 0.07};
+  Sweep sweep{"output = \"step\"\nline = 0\ndirection_line = 1\nstep = 0.05",
+              small + "\nvelocity_max = 25", 0.18};
   double torque = 0.0;
   bool was_high = false;
   sweep.run([&](std::uint32_t levels) {
     const bool high = (levels & 1U) != 0;
-    if (high && !was_high) torque += (levels & 2U) != 0 ? -0.02 : 0.02;
+    if (high && !was_high) torque += (levels & 2U) != 0 ? -0.05 : 0.05;
     was_high = high;
     return torque;
   });
