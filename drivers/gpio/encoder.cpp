@@ -69,12 +69,9 @@ void Encoder::count_until(std::int64_t time_ns) noexcept {
   for (; done < waiting_count_ && waiting_[done].time_ns <= time_ns; ++done) {
     const Edge& edge = waiting_[done];
     const std::int32_t missing = ahead(edge.sequence, next_sequence_);
-    if (missing > 0) {
-      lost_ += static_cast<std::uint64_t>(missing);
-      decoder_.distrust(edge);
-    }
+    if (missing > 0) lost_ += static_cast<std::uint64_t>(missing);
     if (missing >= 0) next_sequence_ = edge.sequence + 1;
-    const int step = decoder_.apply(edge);
+    const int step = missing > 0 ? decoder_.resume(edge) : decoder_.apply(edge);
     if (step == 0 || settings_.samples != EncoderSettings::Samples::edge) continue;
     const double border = static_cast<double>(decoder_.count()) - 0.5 * step;
     last_.value = settings_.offset + settings_.scale * border;

@@ -28,10 +28,11 @@ class Quadrature {
     return step;
   }
 
-  // The edge of this line that comes next is legal, whatever it is: what was before it got lost.
-  void distrust(const Edge& edge) noexcept SINERIG_NONBLOCKING {
-    const std::uint32_t bit = 1U << edge.line;
-    levels_ = edge.active ? levels_ & ~bit : levels_ | bit;
+  // The first edge after some were lost. Where the line has that level already it has come back to
+  // where it was, as far as anyone knows, and no second error is made of it.
+  int resume(const Edge& edge) noexcept SINERIG_NONBLOCKING {
+    const bool was_active = (levels_ & (1U << edge.line)) != 0;
+    return was_active == edge.active ? 0 : apply(edge);
   }
 
   std::int64_t count() const noexcept { return count_; }

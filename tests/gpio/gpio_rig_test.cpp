@@ -311,13 +311,13 @@ TEST(SweepOverLines, OfOneLineGivesTheResponseOfThePlant) {
 }
 
 TEST(SweepOverLines, OfAStepperGivesTheResponseOfThePlant) {
-  Sweep sweep{"output = \"step\"\nline = 0\ndirection_line = 1\nstep = 0.05",
-              small + "\nvelocity_max = 25", 0.18};
+  Sweep sweep{"output = \"step\"\nline = 0\ndirection_line = 1\nstep = 0.2",
+              small + "\nvelocity_max = 100", 0.75};
   double torque = 0.0;
   bool was_high = false;
   sweep.run([&](std::uint32_t levels) {
     const bool high = (levels & 1U) != 0;
-    if (high && !was_high) torque += (levels & 2U) != 0 ? -0.05 : 0.05;
+    if (high && !was_high) torque += (levels & 2U) != 0 ? -0.2 : 0.2;
     was_high = high;
     return torque;
   });
