@@ -66,6 +66,14 @@ class Device {
     watch(start_ns_);
   }
 
+  ~Device() {
+    if (opened_ns_ != 0 && off_ns_ != 0)
+      std::printf("off %.6f s after the interlock opened\n",
+                  static_cast<double>(off_ns_ - opened_ns_) * 1e-9);
+  }
+  Device(const Device&) = delete;
+  Device& operator=(const Device&) = delete;
+
   void run(double seconds) {
     const std::int64_t end_ns = start_ns_ + std::llround(std::min(seconds, 1e9) * 1e9);
     std::int64_t now_ns = start_ns_;
@@ -73,7 +81,7 @@ class Device {
       const auto crossing = axis_.next(now_ns + horizon_ns);
       if (crossing && crossing->time_ns <= now_ns) {
         axis_.take(*crossing);
-        if (now_ns < fault_ns(settings_.faults.stuck_at_s, false)) show(axis_.count());
+        show(axis_.count());
         continue;
       }
       cause_faults(now_ns);
@@ -94,6 +102,7 @@ class Device {
  private:
   // Four counts are one period of the two signals; A leads when the count rises.
   void show(std::int64_t count) {
+    if (monotonic_ns() >= fault_ns(settings_.faults.stuck_at_s, false)) return;
     const auto quarter = static_cast<std::uint64_t>(count) % 4;
     const bool a = quarter == 1 || quarter == 2;
     const bool b = quarter >= 2;
@@ -116,6 +125,7 @@ class Device {
       input = 0.0;
     }
     line_was_high_ = line;
+    if (opened_ns_ != 0 && off_ns_ == 0 && !enabled) off_ns_ = now_ns;
     if (input == input_) return;
     input_ = input;
     axis_.apply(input, now_ns);
@@ -148,6 +158,7 @@ class Device {
     }
     if (now_ns >= fault_ns(faults.interlock_at_s, opened_)) {
       opened_ = true;
+      opened_ns_ = monotonic_ns();
       if (interlock_) interlock_->pull(false);
     }
   }
@@ -178,6 +189,8 @@ class Device {
   bool line_was_high_ = false;
   double stepped_to_ = 0.0;
   double input_ = 0.0;
+  std::int64_t opened_ns_ = 0;  // the interlock
+  std::int64_t off_ns_ = 0;     // the first time that the drive was disabled after that
   bool pulsed_ = false;
   bool burst_ = false;
   bool opened_ = false;

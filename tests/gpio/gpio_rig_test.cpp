@@ -256,7 +256,7 @@ struct Sweep {
 
   // The worst point in units of what rounding to whole counts lets through: an error of q / √12
   // rms, of which one coherent cycle lets √(2 f / rate) to each part of the Fourier coefficient,
-  // and of these √(−2 ln(0.05 / points)) hold all points in 95 % of cases.
+  // and of these √(−2 ln(0.001 / points)) hold all points in 99.9 % of cases.
   double worst_in_intervals() const {
     double worst = 0.0;
     const test::PartialFractions plant = axis_in_closed_form();
@@ -268,7 +268,7 @@ struct Sweep {
       const double sigma = 4e-4 / std::sqrt(12.0) * std::sqrt(2.0 * point.frequency_hz / 1000.0) /
                            point.input_amplitude;
       const auto points = static_cast<double>(sink.points.size());
-      worst = std::max(worst, error / (sigma * std::sqrt(-2.0 * std::log(0.05 / points))));
+      worst = std::max(worst, error / (sigma * std::sqrt(-2.0 * std::log(0.001 / points))));
     }
     return worst;
   }
