@@ -58,12 +58,17 @@ std::uint32_t read_ticks(const Section& section, std::string_view key) {
   return static_cast<std::uint32_t>(section.integer(key, some_ticks, 1));
 }
 
+double read_dither(const Section& section) {
+  return section.number("dither", config::fraction_of_one, 0.5);
+}
+
 DensitySettings read_density(const config::Rig& rig, OutputSettings& output, bool can_disable) {
   const Section& section = rig.actuator.section;
   DensitySettings density;
   density.low = section.number("low", any_number, density.low);
   density.high = section.number("high", any_number, density.high);
   density.hold_ticks = read_ticks(section, "hold_ticks");
+  density.dither = read_dither(section);
   output.safe_active = section.choice("safe", {"inactive", "active"}) == "active";
   if (density.low == density.high) section.refuse("high", "must differ from low");
   const double at_rest = output.safe_active ? density.high : density.low;
@@ -82,6 +87,7 @@ SignMagnitudeSettings read_sign_magnitude(const config::Rig& rig) {
   SignMagnitudeSettings drive;
   drive.full = section.number("full", above_zero, drive.full);
   drive.hold_ticks = read_ticks(section, "hold_ticks");
+  drive.dither = read_dither(section);
   drive.reversal_ticks = static_cast<std::uint32_t>(
       section.integer("reversal_ticks", {.min = 0.0, .max = 1e6}, drive.reversal_ticks));
   if (rig.guard.neutral != 0.0)

@@ -21,7 +21,8 @@ Drive DensityModulator::next(double command) noexcept {
   if (held_ == 0) {
     const double per_decision = static_cast<double>(settings_.hold_ticks);
     const double off_by = error_ - wanted + per_decision * wanted;  // when held as long
-    const double middle = per_decision * 0.5 * (settings_.low + settings_.high);
+    const double middle = per_decision * (0.5 * (settings_.low + settings_.high) +
+                                          dither_.next() * (settings_.high - settings_.low));
     active_ = (settings_.high > settings_.low) == (off_by > middle);
   }
   held_ = (held_ + 1) % settings_.hold_ticks;
@@ -60,7 +61,7 @@ Drive SignMagnitudeModulator::next(double command) noexcept {
 void SignMagnitudeModulator::decide(double wanted) noexcept {
   const double per_decision = static_cast<double>(settings_.hold_ticks);
   const double off_by = error_ - wanted + per_decision * wanted;  // when held as long
-  on_ = std::abs(off_by) > 0.5 * per_decision * settings_.full;
+  on_ = std::abs(off_by) > (0.5 + dither_.next()) * per_decision * settings_.full;
   const bool reverses = on_ && (off_by < 0.0) != negative_;
   if (!reverses) return;
   if (settings_.reversal_ticks == 0) {

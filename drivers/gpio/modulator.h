@@ -25,10 +25,31 @@ class Modulator {
   virtual Drive rest() noexcept = 0;
 };
 
+// A seeded source of thresholds: without it the output of a sine repeats from cycle to cycle, and
+// so does what its levels and an encoder's counts do to the response, which no scatter then shows.
+class Dither {
+ public:
+  // `width` in levels, 0 to 1: thresholds lie within ± width / 2 of the middle.
+  explicit Dither(double width) : width_{width} {}
+
+  double next() noexcept SINERIG_NONBLOCKING {
+    // xorshift64: G. Marsaglia, J. Stat. Softw. 8 (14), 2003
+    state_ ^= state_ << 13U;
+    state_ ^= state_ >> 7U;
+    state_ ^= state_ << 17U;
+    return width_ * (static_cast<double>(state_ >> 11U) * 0x1p-53 - 0.5);
+  }
+
+ private:
+  double width_;
+  std::uint64_t state_ = 0x9e3779b97f4a7c15;
+};
+
 struct DensitySettings {
   double low = 0.0;   // the command that the inactive line stands for
   double high = 1.0;  // and the active one
   std::uint32_t hold_ticks = 1;
+  double dither = 0.0;
 };
 
 // First-order sigma-delta: the line is active for the part (command − low) / (high − low) of the
@@ -36,12 +57,14 @@ struct DensitySettings {
 // worth. Its noise lies towards half the rate of the decisions, rate / hold_ticks.
 class DensityModulator final : public Modulator {
  public:
-  explicit DensityModulator(const DensitySettings& settings) : settings_{settings} {}
+  explicit DensityModulator(const DensitySettings& settings)
+      : settings_{settings}, dither_{settings.dither} {}
   Drive next(double command) noexcept SINERIG_NONBLOCKING override;
   Drive rest() noexcept override;
 
  private:
   DensitySettings settings_;
+  Dither dither_;
   double error_ = 0.0;
   bool active_ = false;
   std::uint32_t held_ = 0;  // ticks since the last decision; 0: decide
@@ -51,13 +74,15 @@ struct SignMagnitudeSettings {
   double full = 1.0;  // the command that an active magnitude line stands for
   std::uint32_t hold_ticks = 1;
   std::uint32_t reversal_ticks = 0;  // off for so long before the sign changes
+  double dither = 0.0;
 };
 
 // The same with three levels: −full, 0, full. The direction line keeps its level while the
 // magnitude is off, and changes in the last tick of a pause before a reversal.
 class SignMagnitudeModulator final : public Modulator {
  public:
-  explicit SignMagnitudeModulator(const SignMagnitudeSettings& settings) : settings_{settings} {}
+  explicit SignMagnitudeModulator(const SignMagnitudeSettings& settings)
+      : settings_{settings}, dither_{settings.dither} {}
   Drive next(double command) noexcept SINERIG_NONBLOCKING override;
   Drive rest() noexcept override;
 
@@ -65,6 +90,7 @@ class SignMagnitudeModulator final : public Modulator {
   void decide(double wanted) noexcept SINERIG_NONBLOCKING;
 
   SignMagnitudeSettings settings_;
+  Dither dither_;
   double error_ = 0.0;
   bool on_ = false;
   bool negative_ = false;   // the direction line

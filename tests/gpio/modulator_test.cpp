@@ -36,6 +36,31 @@ TEST(Density, NeverOwesMoreThanHalfALevel) {
   }
 }
 
+TEST(Density, WithDitherOwesMoreButStillABoundedSum) {
+  DensityModulator output{{.low = -1.0, .high = 3.0, .dither = 0.5}};
+  double owed = 0.0;
+  double most = 0.0;
+  for (int n = 0; n < 20'000; ++n) {
+    const double command = 1.0 + 1.4 * std::sin(0.0371 * n);
+    owed += command - output.next(command).applied;
+    most = std::max(most, std::abs(owed));
+  }
+  EXPECT_LE(most, 4.0 * (0.5 + 0.25) + 1e-9);
+  EXPECT_GT(most, 2.1) << "it is there";
+}
+
+TEST(SignMagnitude, WithDitherIsNotTheSameInEveryCycle) {
+  for (const double dither : {0.0, 0.5}) {
+    SignMagnitudeModulator output{{.full = 1.0, .dither = dither}};
+    std::vector<std::vector<std::uint32_t>> cycles(4);
+    for (auto& cycle : cycles)
+      for (int n = 0; n < 100; ++n)
+        cycle.push_back(output.next(0.6 * std::sin(2.0 * std::numbers::pi * n / 100.0)).levels &
+                        1U);
+    EXPECT_EQ(cycles[2] == cycles[3], dither == 0.0);
+  }
+}
+
 TEST(Density, HoldsALevelForTheTicksAskedFor) {
   DensityModulator output{{.low = 0.0, .high = 1.0, .hold_ticks = 5}};
   std::uint32_t last = 0;
