@@ -27,8 +27,13 @@ class Device {
   // looked at is opened and never armed.
   virtual void arm() {}
 
-  // Why the last command had a fault, for people; empty where there is nothing to say.
+  // Why a command had a fault or a sensor is no longer believed, for people; empty where there is
+  // nothing to say.
   virtual std::string fault_reason() const { return {}; }
+
+  // Whether a sensor is one whose response is wanted unless [sweep] responses says otherwise; an
+  // interlock is not.
+  virtual bool measures(std::size_t /*sensor*/) const { return true; }
 
   // Valid after open(). Null where the device has no actuator.
   virtual Actuator* actuator() noexcept = 0;

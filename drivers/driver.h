@@ -12,11 +12,12 @@ namespace sinerig {
 
 // What is wrong with one sample or one command.
 enum class Fault : std::uint8_t {
-  none,     // new, complete, believed
-  stale,    // nothing new since the last read
-  timeout,  // the device did not answer in time
-  bus,      // the transport failed (bus-off, full queue, checksum, exception reply)
-  range,    // the device says that the value left what it can represent
+  none,       // new, complete, believed
+  stale,      // nothing new since the last read
+  timeout,    // the device did not answer in time
+  bus,        // the transport failed (bus-off, full queue, checksum, exception reply)
+  range,      // the device says that the value left what it can represent
+  interlock,  // a safety circuit is open: the guard stops at once
 };
 
 inline constexpr const char* to_string(Fault fault) noexcept {
@@ -26,6 +27,7 @@ inline constexpr const char* to_string(Fault fault) noexcept {
     case Fault::timeout: return "timeout";
     case Fault::bus: return "bus";
     case Fault::range: return "range";
+    case Fault::interlock: return "interlock";
   }
   return "unknown";
 }

@@ -6,7 +6,7 @@ build_packages=(
   cmake ninja-build g++ pkg-config
   libeigen3-dev libspdlog-dev libgtest-dev libgmock-dev libbenchmark-dev
   libtomlplusplus-dev libcli11-dev libsqlite3-dev nlohmann-json3-dev
-  libmatio-dev librsvg2-dev
+  libmatio-dev librsvg2-dev libgpiod-dev
 )
 
 # What only tests need; without them the tests concerned are skipped and say so.

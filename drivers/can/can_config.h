@@ -2,6 +2,7 @@
 // device profile. Signals are described in place or named after a DBC file.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>

@@ -2,6 +2,7 @@
 // remembering which file it is in, so that messages and relative paths are right.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>

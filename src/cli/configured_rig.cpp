@@ -45,6 +45,23 @@ ConfiguredRig::ConfiguredRig(const std::string& path, const std::vector<DriverKi
     parts_.push_back(std::move(part));
   }
   rig_.file->refuse_unread();
+  choose_responses();
+}
+
+// Without a choice in the file: every sensor that measures something, over what was applied.
+void ConfiguredRig::choose_responses() {
+  if (!rig_.runner.responses.empty()) return;
+  std::vector<bool> measures(rig_.sensors.size(), true);
+  for (const Part& part : parts_) {
+    for (std::size_t i = 0; i < part.sensors.size(); ++i)
+      measures[part.sensors[i]] = part.device->measures(i);
+  }
+  for (std::size_t i = 0; i < measures.size(); ++i) {
+    if (measures[i]) rig_.runner.responses.push_back({.input = 0, .output = 1 + i});
+  }
+  if (rig_.runner.responses.empty())
+    throw config::ConfigError(rig_.file->name() +
+                              ": no sensor measures a response; add one beside the interlock");
 }
 
 void ConfiguredRig::open() {

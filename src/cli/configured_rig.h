@@ -34,6 +34,8 @@ class ConfiguredRig {
     std::vector<std::size_t> sensors;  // index in the rig of each sensor that the device serves
   };
 
+  void choose_responses();
+
   config::Rig rig_;
   std::unique_ptr<Clock> clock_;  // outlives the devices
   std::vector<Part> parts_;

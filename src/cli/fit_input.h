@@ -1,6 +1,7 @@
 // Where a fit gets its response from: a sweep file, or one measured elsewhere.
 #pragma once
 
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 

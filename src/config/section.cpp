@@ -144,6 +144,14 @@ std::string Section::text(std::string_view key) const {
   return *node.value<std::string>();
 }
 
+std::string Section::name_or_index(std::string_view key) const {
+  constexpr std::string_view rule = "must be a name in quotes or a whole number";
+  const toml::node& node = Access::require(*this, key, rule);
+  if (node.is_string()) return text(key);
+  if (!node.is_integer()) refuse(key, rule);
+  return std::to_string(integer(key, {.min = 0.0, .max = 1e6}));
+}
+
 std::string Section::text(std::string_view key, std::string_view fallback) const {
   return has(key) ? text(key) : std::string{fallback};
 }

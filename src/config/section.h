@@ -57,6 +57,9 @@ class Section {
   std::string text(std::string_view key) const;
   std::string text(std::string_view key, std::string_view fallback) const;
 
+  // What can be named or numbered, a GPIO line say: the name, or the digits of the number.
+  std::string name_or_index(std::string_view key) const;
+
   // One of `options`; the first is the fallback.
   std::string choice(std::string_view key, std::initializer_list<std::string_view> options) const;
 

@@ -1,6 +1,7 @@
 // Reads NAME.sweep back into plain values.
 #pragma once
 
+#include <cstdint>
 #include <map>
 #include <string>
 #include <vector>

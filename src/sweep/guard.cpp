@@ -25,6 +25,7 @@ const char* to_string(TripCause cause) noexcept {
     case TripCause::excitation_reversed: return "excitation_reversed";
     case TripCause::recorder_stalled: return "recorder_stalled";
     case TripCause::clock_lost: return "clock_lost";
+    case TripCause::interlock_open: return "interlock_open";
   }
   return "unknown";
 }
@@ -94,6 +95,8 @@ void Guard::observe(std::uint32_t channel, const Sample& sample, std::int64_t no
   const ChannelLimits& limits = settings_.channels[channel];
   ChannelState& state = channels_[channel];
   if (watch_from_ns_ < 0) watch_from_ns_ = now_ns;
+  if (sample.fault == Fault::interlock)
+    trip(TripCause::interlock_open, channel, sample.value, 0.0, tick);
 
   const bool good = sample.fault == Fault::none;
   const std::int64_t newest_ns =
@@ -191,6 +194,7 @@ std::string describe(const Trip& trip, const std::vector<std::string>& channel_n
     case TripCause::clock_lost:
       what = with("the loop stood still for %.3g s (at most %.3g s)", trip.value, trip.limit);
       break;
+    case TripCause::interlock_open: what = name + ": the interlock is open"; break;
   }
   return what + with(" (tick %.0f; command changed to %.6g)", static_cast<double>(trip.tick),
                      trip.command);

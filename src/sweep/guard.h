@@ -47,6 +47,7 @@ enum class TripCause : std::uint8_t {
   excitation_reversed,
   recorder_stalled,
   clock_lost,
+  interlock_open,
 };
 
 const char* to_string(TripCause cause) noexcept;

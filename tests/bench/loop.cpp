@@ -76,6 +76,16 @@ void whole_loop(benchmark::State& state) {
 }
 BENCHMARK(whole_loop)->Unit(benchmark::kMillisecond);
 
+// Google Benchmark 1.8 has renamed it.
+template <class Run>
+bool failed(const Run& run) {
+  if constexpr (requires { run.error_occurred; }) {
+    return run.error_occurred;
+  } else {
+    return static_cast<bool>(run.skipped);
+  }
+}
+
 // The table as ever, and the two loops in ns per tick with their ratio.
 class RatioReporter final : public benchmark::ConsoleReporter {
  public:
@@ -83,7 +93,7 @@ class RatioReporter final : public benchmark::ConsoleReporter {
     ConsoleReporter::ReportRuns(runs);
     for (const Run& run : runs) {
       const auto items = run.counters.find("items_per_second");
-      if (run.error_occurred || items == run.counters.end()) continue;
+      if (failed(run) || items == run.counters.end()) continue;
       ns_per_tick_[run.benchmark_name()] = 1e9 / items->second.value;
     }
   }

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <complex>
+#include <cstdint>
 #include <numbers>
 
 #include <gtest/gtest.h>

@@ -9,7 +9,7 @@ bench_kernel() {
   mkdir -p "$cache" || cannot "$cache cannot be made; set XDG_CACHE_HOME to a folder that can"
 
   local key kernel
-  key=$({ sed 's/#.*//' "$config" | sort; declare -f adapt_source; } | sha256sum | cut -c 1-12)
+  key=$({ sed 's/#.*//' "$config" | sort; declare -f adapt_source read_the_clock_in_4_ns fire_simulated_interrupts_at_once tell_of_simulated_levels; } | sha256sum | cut -c 1-12)
   kernel=$cache/linux-$key
   if [ ! -x "$kernel" ]; then
     exec 9>"$cache/lock"
@@ -20,12 +20,73 @@ bench_kernel() {
   echo "$kernel"
 }
 
+adapt_source() {
+  read_the_clock_in_4_ns && fire_simulated_interrupts_at_once && tell_of_simulated_levels
+}
+
 # In virtual time reading the clock costs time, so that a program which waits by reading it gets on:
 # 256 ns, which is also the resolution. That much jitter in when commands take effect is noise in the
 # 1e-6 of a response; 4 ns is not.
-adapt_source() {
+read_the_clock_in_4_ns() {
   sed -i 's/^#define TIMER_MULTIPLIER 256$/#define TIMER_MULTIPLIER 4/' arch/um/include/linux/time-internal.h
   grep -q '^#define TIMER_MULTIPLIER 4$' arch/um/include/linux/time-internal.h
+}
+
+# Simulated interrupts wait for the next 10 ms tick here, and those of one line that meet there become
+# one. The edges of an encoder need theirs at once.
+fire_simulated_interrupts_at_once() {
+  local file=kernel/irq/irq_sim.c
+  insert_before '^static void irq_sim_irqmask' $file <<'C'
+static void irq_sim_handle_irq(struct irq_work *work);
+
+static void irq_sim_fire(struct irq_sim_work_ctx *work_ctx)
+{
+	unsigned long flags;
+
+	local_irq_save(flags);
+	irq_sim_handle_irq(&work_ctx->work);
+	local_irq_restore(flags);
+}
+
+C
+  sed -i 's/irq_work_queue(&irq_ctx->work_ctx->work);/irq_sim_fire(irq_ctx->work_ctx);/' $file
+  [ "$(grep -c 'irq_sim_fire(' $file)" = 2 ]
+}
+
+# Whoever polls the sysfs file of a level is woken when it is set, so that a simulated device sees each
+# edge of an output when it happens.
+tell_of_simulated_levels() {
+  local file=drivers/gpio/gpio-sim.c one='\tgpio_sim_changed(chip, offset);'
+  insert_before '^static int gpio_sim_apply_pull' $file <<'C'
+static void gpio_sim_changed(struct gpio_sim_chip *chip, unsigned int offset)
+{
+	char name[24];
+
+	snprintf(name, sizeof(name), "sim_gpio%u", offset);
+	sysfs_notify(&chip->gc.gpiodev->dev.kobj, name, "value");
+}
+
+static void gpio_sim_all_changed(struct gpio_sim_chip *chip, unsigned long *mask)
+{
+	unsigned int offset;
+
+	for_each_set_bit(offset, mask, chip->gc.ngpio)
+		gpio_sim_changed(chip, offset);
+}
+
+C
+  sed -i -e "/^static void gpio_sim_set(/,/^}/s/^}/$one\n}/" \
+    -e "/^static void gpio_sim_free(/,/^}/s/^}/$one\n}/" \
+    -e "/^static int gpio_sim_direction_output(/,/^}/s/^\treturn 0;/$one\n&/" \
+    -e '/^static void gpio_sim_set_multiple(/,/^}/s/^}/\tgpio_sim_all_changed(chip, mask);\n}/' $file
+  [ "$(grep -c '_changed(' $file)" = 7 ]
+}
+
+# insert_before PATTERN FILE : standard input, before the first line that matches.
+insert_before() {
+  local line
+  line=$(grep -n -m 1 "$1" "$2" | cut -d : -f 1)
+  [ -n "$line" ] && sed -i "$((line - 1))r /dev/stdin" "$2"
 }
 
 build_kernel() {
