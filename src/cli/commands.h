@@ -1,6 +1,7 @@
 // The commands of the program, one function each. They throw; main catches.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,11 +19,30 @@ enum ExitCode : int {
   exit_changed = 5,      // compare: at least one point differs
 };
 
+// What a command says on standard output.
+enum class Voice {
+  text,   // for people: drawn on a terminal, plain lines elsewhere
+  quiet,  // nothing; warnings and errors on standard error remain
+  json,   // for scripts
+};
+
 struct RunOptions {
   std::string rig;
   std::string output;  // empty: NAME.sweep of the rig file, numbered when it exists
   bool force = false;
-  bool report = true;  // write NAME.html at the end
+  bool report = true;                     // write NAME.html at the end
+  Voice voice = Voice::text;              // json: one object per line, plan, points, end
+  std::optional<std::string> serve = {};  // ADDR:PORT of the live page; empty: the default
+};
+
+struct PlanOptions {
+  std::string rig;
+  bool json = false;
+};
+
+struct ShowOptions {
+  std::string file;
+  bool json = false;
 };
 
 struct ExportOptions {
@@ -46,11 +66,12 @@ struct CompareOptions {
   record::CompareSettings settings;
   std::string output;  // overlay as a page; empty: none
   bool force = false;
+  Voice voice = Voice::text;
 };
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
-int plan_command(const std::string& rig, const std::vector<DriverKit>& drivers);
-int show_command(const std::string& file);
+int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drivers);
+int show_command(const ShowOptions& options);
 int export_command(const ExportOptions& options);
 int report_command(const ReportOptions& options);
 int compare_command(const CompareOptions& options);

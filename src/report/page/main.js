@@ -146,5 +146,3 @@ function build() {
     redraw();
   });
 }
-
-build();
