@@ -1,6 +1,6 @@
 // The page of a run that goes on: the head with its Stop button, points as they come in, the end.
 
-const live = { ended: null, lost: false, stops: 0, log: false, plan: null, drawn: 0 };
+const live = { ended: null, lost: false, stops: 0, log: false, tables: false, plan: null, drawn: -Infinity };
 
 function takeToken() {
   const found = location.hash.match(/token=([0-9a-f]+)/);
@@ -136,15 +136,18 @@ function draw(time) {
   drawNow();
   if (live.log || live.ended) {
     live.log = false;
+    live.tables = true;
     refreshSmall();
     plots.forEach(plot => plot.render());
-    if (time - live.drawn > 1000 || live.ended) {
-      live.drawn = time;
-      writeTables(document.getElementById('tables'));
-    }
     showReadout();
   } else {
     plots.slice(0, 2).forEach(plot => plot.render());
+  }
+  // Hundreds of rows are the dear part; statuses come ten times a second.
+  if (live.tables && (time - live.drawn > 1000 || live.ended)) {
+    live.drawn = time;
+    live.tables = false;
+    writeTables(document.getElementById('tables'));
   }
 }
 
