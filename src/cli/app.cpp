@@ -1,11 +1,14 @@
 #include "cli/app.h"
 
+#include <iostream>
+
 #include <CLI/CLI.hpp>
 #include <spdlog/cfg/env.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "cli/completion.h"
 #include "cli/file_arguments.h"
 #include "cli/fit_command.h"
 #include "cli/fit_input.h"
@@ -190,6 +193,14 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   CompareOptions compare_options;
   CLI::App* comparer = add_compare(app, compare_options);
   CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
+  std::string shell;
+  CLI::App* completion = app.add_subcommand(
+      "completion", "Print the completion script of a shell: source <(sinerig completion bash)");
+  completion->add_option("SHELL", shell, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  CLI::App* manual =
+      app.add_subcommand("manual", "Print the manual page: sinerig manual | man -l -");
 
   try {
     app.parse(arguments_of(argc, argv));
@@ -211,6 +222,14 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     if (notch->parsed()) return notch_command(notch_options);
     if (comparer->parsed()) return compare_command(compare_options);
     if (list->parsed()) return drivers_command(drivers);
+    if (completion->parsed()) {
+      write_completion(std::cout, app, shell);
+      return exit_done;
+    }
+    if (manual->parsed()) {
+      write_manual(std::cout, app);
+      return exit_done;
+    }
   } catch (const config::ConfigError& error) {
     spdlog::error("{}", error.what());
     return exit_usage;

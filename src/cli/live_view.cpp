@@ -53,7 +53,6 @@ LiveView::LiveView(const std::string& address, const config::Rig& rig, const Swe
     spdlog::warn("{} can be reached from the network: whoever can may watch, without encryption",
                  server_.address().text());
   }
-  spdlog::info("live page: {}", server_.url());
 }
 
 void LiveView::finish(const RunEnd& end) {

@@ -16,12 +16,14 @@ namespace sinerig::cli {
 
 class LiveView {
  public:
-  // Serves from here on and says where. Throws std::invalid_argument for an address that is none,
+  // Serves from here on. Throws std::invalid_argument for an address that is none,
   // std::runtime_error for one that cannot be had. `clock` and `control` must outlive it.
   LiveView(const std::string& address, const config::Rig& rig, const SweepPlan& plan, Clock& clock,
            RunControl& control);
 
   dashboard::LiveRun& run() { return run_; }
+  // Where, the token in it.
+  std::string url() const { return server_.url(); }
   // For the loop in place of its own.
   Clock& clock() { return clock_; }
 

@@ -26,8 +26,8 @@ CLI::App* add_run(CLI::App& app, RunOptions& options) {
       "do not write the report NAME.html at the end");
   const std::string address = dashboard::Address{}.text();
   run->add_flag("--serve{" + address + "}", options.serve,
-                "show the run in a browser while it goes on, with a Stop button, at ADDR:PORT "
-                "(default " +
+                "show the run in a browser while it goes on, with a Stop button; --serve=ADDR:PORT "
+                "for elsewhere (default " +
                     address + ", for this machine only; port 0: any free one)");
   CLI::Option* quiet = run->add_flag_callback(
       "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");

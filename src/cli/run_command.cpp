@@ -147,13 +147,14 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const SweepPlan plan = rig.plan();
   Clock& clock = configured.clock();
   RunControl control;
+  const StopOnSignal stop_on_signal{control};
   const std::string path =
       options.output.empty() ? default_output(options.rig, options.force) : options.output;
   RunTeller teller{options.voice, rig, plan};
   const std::unique_ptr<LiveView> view =
       options.serve ? std::make_unique<LiveView>(*options.serve, rig, plan, clock, control)
                     : nullptr;
-  teller.plan();
+  teller.plan(view ? view->url() : "");
 
   record::SweepWriter writer{path, run_info(rig, plan),
                              options.force ? record::SweepWriter::IfExists::replace
@@ -162,7 +163,6 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   Outbox outbox{outbox_slots, outbox_backlog,
                 in_real_time ? Outbox::WhenFull::keep : Outbox::WhenFull::wait};
   Guard guard{rig.guard, clock.grid().period_s()};
-  const StopOnSignal stop_on_signal{control};
   try {
     configured.open();
     configured.arm();

@@ -45,18 +45,20 @@ RunTeller::RunTeller(Voice voice, const config::Rig& rig, const SweepPlan& plan)
       plan_{plan},
       progress_{std::cout, style_of(voice), plan, terminal_columns()} {}
 
-void RunTeller::plan() {
+void RunTeller::plan(const std::string& live_page) {
   if (voice_ == Voice::json) {
-    print_line({{"type", "plan"},
-                {"rig", rig_.file->name()},
-                {"rate_hz", plan_.rate_hz},
-                {"points", plan_.dwells.size()},
-                {"least_s", plan_.min_seconds()},
-                {"most_s", plan_.max_seconds()}});
-  } else {
-    spdlog::info("{} points, {} of bench time", plan_.dwells.size(),
-                 report::bench_time_text(plan_));
+    Json line{{"type", "plan"},
+              {"rig", rig_.file->name()},
+              {"rate_hz", plan_.rate_hz},
+              {"points", plan_.dwells.size()},
+              {"least_s", plan_.min_seconds()},
+              {"most_s", plan_.max_seconds()}};
+    if (!live_page.empty()) line["live_page"] = live_page;
+    return print_line(line);
   }
+  spdlog::info("{} points, {} of bench time", plan_.dwells.size(), report::bench_time_text(plan_));
+  // Quiet or not: without the token in it nobody could stop the run from the page.
+  if (!live_page.empty()) std::cerr << "live page: " << live_page << std::endl;
 }
 
 void RunTeller::point(const Point& point) {

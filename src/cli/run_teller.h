@@ -23,7 +23,8 @@ class RunTeller {
   // `rig` and `plan` must outlive it.
   RunTeller(Voice voice, const config::Rig& rig, const SweepPlan& plan);
 
-  void plan();
+  // What will be run; `live_page` is where it can be watched, empty where it can't.
+  void plan(const std::string& live_page);
   void point(const Point& point);
   void update(std::uint32_t dwell, std::uint64_t tick);
   // The loop has ended.

@@ -36,12 +36,10 @@ class Serve : public test::ProgramTest {
 
 TEST_F(Serve, StopEndsTheRunAsCtrlCDoes) {
   test::Program program{{"run", "slow.toml", "--serve", ":0", "--json"}, folder_};
-  program.read_line();  // the plan: the server is there before it
-  const std::string said = read("stderr.txt");
-  const std::size_t at = said.find("http://127.0.0.1:");
-  ASSERT_NE(at, std::string::npos) << said;
-  const auto port = static_cast<std::uint16_t>(std::stoi(said.substr(at + 17)));
-  const std::string token = said.substr(said.find("token=") + 6, 32);
+  const std::string url = nlohmann::json::parse(program.read_line())["live_page"];
+  ASSERT_EQ(url.rfind("http://127.0.0.1:", 0), 0U) << url;
+  const auto port = static_cast<std::uint16_t>(std::stoi(url.substr(17)));
+  const std::string token = url.substr(url.find("token=") + 6);
   EXPECT_EQ(test::HttpClient{port}.post("/stop").status(), "403");
   EXPECT_EQ(test::HttpClient{port}.post("/stop", "X-Sinerig-Token: " + token + "\r\n").status(),
             "204");
