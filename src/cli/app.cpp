@@ -12,6 +12,7 @@
 #include "cli/file_arguments.h"
 #include "cli/fit_command.h"
 #include "cli/fit_input.h"
+#include "cli/loop_arguments.h"
 #include "cli/margins_command.h"
 #include "cli/notch_command.h"
 #include "cli/run_arguments.h"
@@ -81,23 +82,6 @@ CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
   fit->add_flag("--json", options.json, "print one JSON object");
   fit->add_flag("--no-store", options.no_store, "do not store the fit in the sweep file");
   return fit;
-}
-
-void add_loop_options(CLI::App& command, LoopOptions& options) {
-  command
-      .add_option("--controller-num", options.controller_num,
-                  "controller's numerator, descending powers of s: C1,C2,...")
-      ->delimiter(',');
-  command.add_option("--controller-den", options.controller_den, "its denominator")->delimiter(',');
-  command
-      .add_option("--pid", options.pid,
-                  "controller KP,KI,KD[,FILTER_HZ]: KP + KI/s + KD s/(1 + s/(2 pi FILTER_HZ))")
-      ->delimiter(',');
-  command.add_option("--rate", options.rate_hz,
-                     "rate in Hz that the controller runs at, by Tustin behind a zero-order hold; "
-                     "0: continuous (default: the loop rate of a sweep file)");
-  command.add_option("--loop-delay", options.delay_s,
-                     "more delay in the loop, seconds: calculation, transport");
 }
 
 CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {

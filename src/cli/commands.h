@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "cli/loop_options.h"
 #include "drivers/device.h"
 #include "record/compare.h"
 
@@ -57,14 +58,19 @@ struct ReportOptions {
   std::string file;
   std::string format = "html";  // html, svg or png
   std::string output;           // empty: FILE's name with the format's extension
-  std::string channel;          // of svg and png; empty: the first sensor
+  std::string channel;          // of the picture and of the loop; empty: the first sensor
+  LoopOptions loop;             // with a controller the page shows margins and a notch, too
   bool force = false;
 };
 
 struct CompareOptions {
   std::vector<std::string> files;  // the first is what the others are compared with
   record::CompareSettings settings;
-  std::string output;  // overlay as a page; empty: none
+  bool drift = false;  // resonances of the models, too; with a controller in `loop` the margins
+  LoopOptions loop;
+  std::string channel;             // of `drift`
+  double tolerance_percent = 0.0;  // of `drift`
+  std::string output;              // overlay as a page; empty: none
   bool force = false;
   Voice voice = Voice::text;
 };

@@ -1,5 +1,7 @@
 #include "cli/file_arguments.h"
 
+#include "cli/loop_arguments.h"
+
 namespace sinerig::cli {
 
 namespace {
@@ -37,7 +39,9 @@ CLI::App* add_export(CLI::App& app, ExportOptions& options) {
 
 CLI::App* add_report(CLI::App& app, ReportOptions& options) {
   CLI::App* reporter = app.add_subcommand(
-      "report", "Write a sweep file's report: one HTML page for any browser, or a picture");
+      "report",
+      "Write a sweep file's report: one HTML page for any browser, or a picture. With a "
+      "controller the page shows the loop, its margins and a notch for it, before and after");
   reporter->add_option("FILE", options.file, measured_file)->required();
   reporter
       ->add_option("--format", options.format,
@@ -47,9 +51,10 @@ CLI::App* add_report(CLI::App& app, ReportOptions& options) {
   reporter->add_option("-o,--output", options.output,
                        "file to write (default: FILE's name with the format's extension)");
   reporter->add_option("--channel", options.channel,
-                       "sensor that the picture shows (default: the first)");
+                       "sensor of the picture and of the loop (default: the first)");
   reporter->add_flag("--force", options.force,
                      "replace the file if it exists (a report is replaced anyway)");
+  add_loop_options(*reporter, options.loop);
   return reporter;
 }
 
@@ -76,6 +81,16 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
       ->capture_default_str();
   comparer->add_option("-o,--output", options.output, "page that lays them over each other");
   comparer->add_flag("--force", options.force, "replace the page if it exists");
+  comparer->add_flag("--drift", options.drift,
+                     "compare the resonances of the models, too; with a controller the margins");
+  add_loop_options(*comparer, options.loop);
+  comparer->add_option("--channel", options.channel,
+                       "sensor whose model is compared (default: the first)");
+  comparer
+      ->add_option("--tolerance-percent", options.tolerance_percent,
+                   "changes of a resonance or margin up to this part of it are none")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   CLI::Option* quiet = comparer->add_flag_callback(
       "--quiet", [&options] { options.voice = Voice::quiet; },
       "print nothing: the exit code tells");
