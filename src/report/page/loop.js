@@ -49,7 +49,7 @@ const loopFigures = [
   ['Phase margin, °', l => l.phase_margin && l.phase_margin.margin_deg],
   ['Gain crossover, Hz', l => l.phase_margin && l.phase_margin.frequency_hz],
   ['Delay margin, ms', l => l.delay_margin && l.delay_margin.delay_s, 1e3],
-  ['Sensitivity peak Ms', l => l.sensitivity_peak && (l.sensitivity_peak.peak || l.sensitivity_peak)],
+  ['Sensitivity peak Ms', l => l.sensitivity_peak && l.sensitivity_peak.peak],
   ['Bandwidth of T, Hz', l => l.bandwidth_hz],
 ];
 
@@ -94,7 +94,7 @@ function notchTable() {
     n.interval_hz.map(v => significant(v, 6)).join(' to '),
     fixed(n.worst_attenuation_db, 1),
     fixed(n.phase_cost_deg, 3) + ' at ' + significant(n.crossover_hz, 4) + ' Hz',
-    n.biquad ? `<code>${n.biquad.map(v => esc(String(v))).join(', ')}</code>` : '–',
+    n.biquad ? `<code>${n.biquad.b.concat(n.biquad.a.slice(1)).join(', ')}</code>` : '–',
   ]);
   return simpleTable(
     ['Hz', 'depth dB', 'width Hz', 'resonance within Hz', 'attenuates at least dB', 'phase cost °', 'b0, b1, b2, a1, a2'],
