@@ -47,13 +47,13 @@ std::string status_text(const Point& point) {
 std::string line_of(const Point& point, std::size_t dwells) {
   constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
   const auto half = [](const char* format, double value) {
-    return std::isfinite(value) ? text(format, value) : std::string{"       –"};
+    return std::isfinite(value) ? text(format, value) : std::string{" ±–      "};
   };
   return text("%4u/%zu %10.4f Hz  %9.3f dB", point.dwell + 1, dwells, point.frequency_hz,
               gain_db(point)) +
-         half(" ±%6.2g", point.gain_interval_db) +
+         half(" ±%-7.2g", point.gain_interval_db) +
          text("  %8.2f°", std::arg(point.response) * degrees_per_radian) +
-         half(" ±%6.2g", point.phase_interval_deg) + "  ";
+         half(" ±%-7.2g", point.phase_interval_deg) + "  ";
 }
 
 }  // namespace

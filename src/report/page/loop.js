@@ -66,7 +66,7 @@ function loopTable() {
     ['model', loop.model],
     ['points', loop.points],
   ];
-  if (loop.notch && loop.notch.after) columns.push(['model with the notch', loop.notch.after]);
+  if (loop.notch && loop.notch.after) columns.push(['with notch', loop.notch.after]);
   const rows = loopFigures.map(([name, get, scale]) => [
     name,
     ...columns.map(([, figures]) => figureCell(get(figures), scale)),
@@ -103,10 +103,17 @@ function notchTable() {
   );
 }
 
+const marginsPanel = () =>
+  `<section class="panel" id="margins"><h3>Margins <span>with ${esc(page.loop.controller)}${page.loop.rate_hz ? ` at ${page.loop.rate_hz} Hz` : ''}, 95 % intervals</span></h3>${loopTable()}</section>`;
+
 const loopSections = () =>
   page.loop
-    ? section('Margins with ' + page.loop.controller, page.loop.rate_hz ? `at ${page.loop.rate_hz} Hz, 95 % intervals` : '95 % intervals', loopTable(), true) +
-      section('Proposed notch', page.loop.notch ? 'keeps its attenuation wherever the resonance may lie' : 'none', notchTable(), true)
+    ? section(
+        'Proposed notch',
+        page.loop.notch ? 'keeps its attenuation wherever the resonance may lie' : 'none',
+        notchTable(),
+        true,
+      )
     : '';
 
 const driftSections = () =>

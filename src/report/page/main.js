@@ -116,6 +116,7 @@ function build() {
     new Nyquist(plane);
     for (const r of page.responses)
       for (const m of r.models) if (m.poles.length) new PoleZeroMap(plane, r, m);
+    if (page.loop) plane.insertAdjacentHTML('beforeend', marginsPanel());
     smallPlots(small);
   } else {
     main.querySelector('.sheet').innerHTML =
