@@ -112,11 +112,13 @@ function build() {
         ),
       );
     }
-    if (page.loop) loopPlots(bode);
+    if (page.loop) {
+      loopPlots(bode);
+      bode.insertAdjacentHTML('beforeend', marginsPanel());
+    }
     new Nyquist(plane);
     for (const r of page.responses)
       for (const m of r.models) if (m.poles.length) new PoleZeroMap(plane, r, m);
-    if (page.loop) plane.insertAdjacentHTML('beforeend', marginsPanel());
     smallPlots(small);
   } else {
     main.querySelector('.sheet').innerHTML =
