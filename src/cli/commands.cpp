@@ -19,9 +19,12 @@ void print_plan_as_json(const config::Rig& rig, const SweepPlan& plan) {
     const auto seconds = [&](std::uint64_t samples) {
       return static_cast<double>(samples) / plan.rate_hz;
     };
+    nlohmann::ordered_json tones = nlohmann::ordered_json::array();
+    for (const Tone& tone : dwell.tones)
+      tones.push_back(
+          {{"freq_hz", dwell.tone_hz(tone, plan.rate_hz)}, {"amplitude", tone.amplitude}});
     dwells.push_back({{"asked_hz", dwell.asked_hz},
-                      {"freq_hz", dwell.frequency_hz(plan.rate_hz)},
-                      {"amplitude", dwell.tones.front().amplitude},
+                      {"tones", tones},
                       {"settle_s", seconds(dwell.settle_samples)},
                       {"blocks", dwell.blocks},
                       {"block_s", seconds(dwell.block_samples)},

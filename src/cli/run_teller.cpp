@@ -50,13 +50,15 @@ void RunTeller::plan(const std::string& live_page) {
     Json line{{"type", "plan"},
               {"rig", rig_.file->name()},
               {"rate_hz", plan_.rate_hz},
-              {"points", plan_.dwells.size()},
+              {"points", report::point_count(plan_)},
+              {"dwells", plan_.dwells.size()},
               {"least_s", plan_.min_seconds()},
               {"most_s", plan_.max_seconds()}};
     if (!live_page.empty()) line["live_page"] = live_page;
     return print_line(line);
   }
-  spdlog::info("{} points, {} of bench time", plan_.dwells.size(), report::bench_time_text(plan_));
+  spdlog::info("{}, {} of bench time", report::plan_size_text(plan_),
+               report::bench_time_text(plan_));
   // Quiet or not: without the token in it nobody could stop the run from the page.
   if (!live_page.empty()) std::cerr << "live page: " << live_page << std::endl;
 }

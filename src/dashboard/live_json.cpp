@@ -55,8 +55,10 @@ Json head_json(const std::string& label, const record::StoredRun& run, bool in_r
   double low = unlimited;
   double high = 0.0;
   for (const Dwell& dwell : run.plan.dwells) {
-    low = std::min(low, dwell.frequency_hz(run.plan.rate_hz));
-    high = std::max(high, dwell.frequency_hz(run.plan.rate_hz));
+    for (const Tone& tone : dwell.tones) {
+      low = std::min(low, dwell.tone_hz(tone, run.plan.rate_hz));
+      high = std::max(high, dwell.tone_hz(tone, run.plan.rate_hz));
+    }
   }
   page["range"] = {rounded(low, 9), rounded(high, 9)};
   page["dwells"] = run.plan.dwells.size();

@@ -31,6 +31,13 @@ std::vector<std::string> units_of(const record::StoredRun& run) {
   return units;
 }
 
+// Two cycles of this are two of the slowest tone.
+double lowest_hz(const Dwell& dwell, double rate_hz) {
+  double lowest = dwell.frequency_hz(rate_hz);
+  for (const Tone& tone : dwell.tones) lowest = std::min(lowest, dwell.tone_hz(tone, rate_hz));
+  return lowest;
+}
+
 double planned_amplitude(const SweepPlan& plan, std::uint32_t dwell) {
   return dwell < plan.dwells.size() ? plan.dwells[dwell].tones.front().amplitude : 0.0;
 }
@@ -83,7 +90,7 @@ void LiveRun::take(const Record& record) {
         retries_ = 0;
       }
       dwell_ = event->dwell;
-      scope_.start(plan.dwells[dwell_].frequency_hz(plan.rate_hz));
+      scope_.start(lowest_hz(plan.dwells[dwell_], plan.rate_hz));
       for (RunningEstimate& estimate : estimates_) estimate.start();
       time_.update(event->dwell, event->tick);
       return;
@@ -157,6 +164,7 @@ Text LiveRun::status() {
   if (now.dwell < plan.dwells.size()) {
     const Dwell& dwell = plan.dwells[now.dwell];
     json["hz"] = rounded(dwell.frequency_hz(plan.rate_hz), 9);
+    json["tones"] = dwell.tones.size();
     json["waiting"] = now.dwell_s * plan.rate_hz < static_cast<double>(dwell.settle_samples);
     json["dwell_most_s"] = rounded(static_cast<double>(dwell.max_samples) / plan.rate_hz, 5);
   }

@@ -44,13 +44,12 @@ std::string status_text(const Point& point) {
   return to_string(point.status) + (reason.empty() ? "" : ": " + reason);
 }
 
-std::string line_of(const Point& point, std::size_t dwells) {
+std::string line_of(const Point& point, std::size_t number, std::size_t points) {
   constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
   const auto half = [](const char* format, double value) {
     return std::isfinite(value) ? text(format, value) : std::string{" ±–      "};
   };
-  return text("%4u/%zu %10.4f Hz  %9.3f dB", point.dwell + 1, dwells, point.frequency_hz,
-              gain_db(point)) +
+  return text("%4zu/%zu %10.4f Hz  %9.3f dB", number, points, point.frequency_hz, gain_db(point)) +
          half(" ±%-7.2g", point.gain_interval_db) +
          text("  %8.2f°", std::arg(point.response) * degrees_per_radian) +
          half(" ±%-7.2g", point.phase_interval_deg) + "  ";
@@ -66,11 +65,12 @@ Progress::Progress(std::ostream& stream, Style style, const SweepPlan& plan, std
       time_{plan} {}
 
 void Progress::point(const Point& point) {
-  if (point.tone != 0 || point.pair != 0) return;
+  if (point.pair != 0) return;
+  ++seen_;
   if (point.status != PointStatus::good) ++not_good_;
   if (style_ == Style::live) points_.push_back(point);
   if (style_ == Style::lines)
-    stream_ << line_of(point, plan_.dwells.size()) << status_text(point) << std::endl;
+    stream_ << line_of(point, seen_, point_count(plan_)) << status_text(point) << std::endl;
 }
 
 void Progress::update(std::uint32_t dwell, std::uint64_t tick) {
@@ -114,8 +114,10 @@ std::vector<std::string> Progress::plot(std::size_t width) const {
   double first_hz = unlimited;
   double last_hz = 0.0;
   for (const Dwell& dwell : plan_.dwells) {
-    first_hz = std::min(first_hz, dwell.frequency_hz(plan_.rate_hz));
-    last_hz = std::max(last_hz, dwell.frequency_hz(plan_.rate_hz));
+    for (const Tone& tone : dwell.tones) {
+      first_hz = std::min(first_hz, dwell.tone_hz(tone, plan_.rate_hz));
+      last_hz = std::max(last_hz, dwell.tone_hz(tone, plan_.rate_hz));
+    }
   }
   std::vector<std::string> rows = sparkline(curve, width - label_width, plot_rows,
                                             std::log(first_hz), std::log(last_hz), low, high);
@@ -152,7 +154,7 @@ std::vector<std::string> Progress::picture() const {
       continue;
     }
     const bool good = points_[i].status == PointStatus::good;
-    lines.push_back(line_of(points_[i], plan_.dwells.size()) + (good ? green : yellow) +
+    lines.push_back(line_of(points_[i], i + 1, point_count(plan_)) + (good ? green : yellow) +
                     status_text(points_[i]) + plain);
   }
   return lines;

@@ -24,7 +24,7 @@ class Progress {
   // `columns` is the width of the terminal; below 80 a live picture becomes lines.
   Progress(std::ostream& stream, Style style, const SweepPlan& plan, std::size_t columns);
 
-  // A finished point; those of the first response and tone are shown.
+  // A finished point; those of the first response are shown.
   void point(const Point& point);
 
   // Where the loop is. Draws; at most ten times a second does a picture change.
@@ -46,6 +46,7 @@ class Progress {
   RemainingTime time_;
   std::uint32_t dwell_ = 0;
   std::vector<Point> points_;
+  std::size_t seen_ = 0;
   std::size_t not_good_ = 0;
   std::size_t drawn_lines_ = 0;
   std::chrono::steady_clock::time_point next_{};

@@ -60,9 +60,14 @@ std::string duration_text(double seconds) {
   return text("%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
-std::string plan_size_text(const SweepPlan& plan) {
+std::size_t point_count(const SweepPlan& plan) {
   std::size_t points = 0;
   for (const Dwell& dwell : plan.dwells) points += dwell.tones.size();
+  return points;
+}
+
+std::string plan_size_text(const SweepPlan& plan) {
+  const std::size_t points = point_count(plan);
   const std::string size = text("%zu points", points);
   return points == plan.dwells.size() ? size : size + text(" in %zu dwells", plan.dwells.size());
 }

@@ -131,7 +131,7 @@ function drawState() {
   document.getElementById('dwell-note').textContent =
     s.hz === undefined
       ? ''
-      : `${significant(inFrequency(s.hz), 5)} ${frequencyUnit()}, amplitude ${significant(s.amplitude, 3)} ${page.channels[0].unit}` +
+      : `${significant(inFrequency(s.hz), 5)} ${frequencyUnit()}${s.tones > 1 ? ` and ${s.tones - 1} more` : ''}, amplitude ${significant(s.amplitude, 3)} ${page.channels[0].unit}` +
         (s.retries ? `, try ${s.retries + 1}` : '');
   document.getElementById('estimate').innerHTML =
     `<table>${page.responses.map((r, i) => estimateRow(s.estimates[i], r)).join('')}</table>` +
