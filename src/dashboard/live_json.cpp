@@ -84,9 +84,12 @@ Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) 
     if (const auto* point = std::get_if<Point>(&entry)) {
       points[point->pair].push_back(record::stored_point(*point));
     } else if (const auto* timing = std::get_if<DwellTiming>(&entry)) {
-      frequencies.push_back(
-          rounded(run.plan.dwells.at(timing->dwell).frequency_hz(run.plan.rate_hz), 9));
-      latest.push_back(rounded(1e-3 * static_cast<double>(timing->max_lateness_ns), 4));
+      // A dwell that a refinement added is not in the plan: its ticks count, it has no bar.
+      if (timing->dwell < run.plan.dwells.size()) {
+        frequencies.push_back(
+            rounded(run.plan.dwells[timing->dwell].frequency_hz(run.plan.rate_hz), 9));
+        latest.push_back(rounded(1e-3 * static_cast<double>(timing->max_lateness_ns), 4));
+      }
       for (std::size_t bin = 0; bin < histogram.size(); ++bin)
         histogram[bin] += timing->lateness[bin];
     } else if (const auto* event = std::get_if<Event>(&entry)) {

@@ -64,8 +64,13 @@ class Server::Loop {
         wake_{eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)},
         page_{live_page()} {
     settings_.address.port = listener_.port();
+    // Whatever fails here, out of memory say, ends the page and nothing else.
     thread_ = std::thread{[this] {
-      serve();
+      try {
+        serve();
+      } catch (...) {
+        clients_.clear();
+      }
     }};
   }
 
