@@ -11,7 +11,13 @@ build_packages=(
 
 # What only tests need; without them the tests concerned are skipped and say so.
 test_packages=(
-  chromium fonts-dejavu-core octave python3-scipy python3-jsonschema
+  fonts-dejavu-core python3-scipy python3-jsonschema
+)
+
+# Heavy ones, for the same: the pages in a browser, the exports in Octave, completion in other shells.
+# CI installs them; `tools/test --full` does here.
+optional_test_packages=(
+  chromium octave zsh fish groff
 )
 
 # usage TOOL : the comment at its head.

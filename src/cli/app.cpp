@@ -1,15 +1,21 @@
 #include "cli/app.h"
 
+#include <iostream>
+
 #include <CLI/CLI.hpp>
 #include <spdlog/cfg/env.h>
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "cli/completion.h"
+#include "cli/file_arguments.h"
 #include "cli/fit_command.h"
 #include "cli/fit_input.h"
+#include "cli/loop_arguments.h"
 #include "cli/margins_command.h"
 #include "cli/notch_command.h"
+#include "cli/run_arguments.h"
 #include "config/section.h"
 #include "record/database.h"
 #include "version.h"
@@ -36,9 +42,6 @@ constexpr const char* footer =
     "Exit codes: 0 done, 1 failed, 2 usage or configuration, 3 stopped by a limit or a fault,\n"
     "4 interrupted, 5 compare found a change. Every key of a rig file is explained in the files of "
     "config/.";
-
-constexpr const char* measured_file =
-    "sweep file, or a response measured elsewhere: .csv, .txt, .mat, .uff or .unv";
 
 CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
   CLI::App* fit = app.add_subcommand(
@@ -79,23 +82,6 @@ CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
   fit->add_flag("--json", options.json, "print one JSON object");
   fit->add_flag("--no-store", options.no_store, "do not store the fit in the sweep file");
   return fit;
-}
-
-void add_loop_options(CLI::App& command, LoopOptions& options) {
-  command
-      .add_option("--controller-num", options.controller_num,
-                  "controller's numerator, descending powers of s: C1,C2,...")
-      ->delimiter(',');
-  command.add_option("--controller-den", options.controller_den, "its denominator")->delimiter(',');
-  command
-      .add_option("--pid", options.pid,
-                  "controller KP,KI,KD[,FILTER_HZ]: KP + KI/s + KD s/(1 + s/(2 pi FILTER_HZ))")
-      ->delimiter(',');
-  command.add_option("--rate", options.rate_hz,
-                     "rate in Hz that the controller runs at, by Tustin behind a zero-order hold; "
-                     "0: continuous (default: the loop rate of a sweep file)");
-  command.add_option("--loop-delay", options.delay_s,
-                     "more delay in the loop, seconds: calculation, transport");
 }
 
 CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
@@ -172,60 +158,16 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
                  "trace, debug, info, warn, error or off (also: SPDLOG_LEVEL)")
       ->check(CLI::IsMember({"trace", "debug", "info", "warn", "error", "off"}));
 
-  std::string rig;
-  std::string file;
+  PlanOptions plan_options;
+  CLI::App* plan = add_plan(app, plan_options);
   RunOptions run_options;
+  CLI::App* run = add_run(app, run_options);
+  ShowOptions show_options;
+  CLI::App* show = add_show(app, show_options);
   ExportOptions export_options;
+  CLI::App* exporter = add_export(app, export_options);
   ReportOptions report_options;
-
-  CLI::App* plan = app.add_subcommand(
-      "plan", "Print every dwell of a rig file and the total duration; refuse what can't be run");
-  plan->add_option("RIG", rig, "rig file (TOML)")->required();
-
-  CLI::App* run = app.add_subcommand("run", "Run the sweep of a rig file and write a sweep file");
-  run->add_option("RIG", run_options.rig, "rig file (TOML)")->required();
-  run->add_option(
-      "-o,--output", run_options.output,
-      "sweep file to write (default: RIG's name + .sweep, here; numbered when it exists)");
-  run->add_flag("--force", run_options.force, "replace the sweep file if it exists");
-  bool no_report = false;
-  run->add_flag("--no-report", no_report, "do not write the report NAME.html at the end");
-
-  CLI::App* show =
-      app.add_subcommand("show", "Print a sweep file: how the run went and its points");
-  show->add_option("FILE", file, measured_file)->required();
-
-  CLI::App* exporter = app.add_subcommand(
-      "export", "Write responses for other programs: CSV, JSON, MATLAB, UFF 58, source text");
-  exporter->add_option("FILE", export_options.file, measured_file)->required();
-  exporter
-      ->add_option("--format", export_options.format,
-                   "csv; json; mat: MATLAB 5, the fields of frd and idfrd; uff: dataset 58; "
-                   "snippet: Python source, or MATLAB's with -o NAME.m")
-      ->check(CLI::IsMember({"csv", "json", "mat", "uff", "snippet"}))
-      ->capture_default_str();
-  exporter->add_option("-o,--output", export_options.output,
-                       "file to write (default: standard output)");
-  exporter->add_option(
-      "--channel", export_options.channel,
-      "sensor whose response is written (default: the first; all in json, mat and uff)");
-  exporter->add_flag("--force", export_options.force, "replace the file if it exists");
-
-  CLI::App* reporter = app.add_subcommand(
-      "report", "Write a sweep file's report: one HTML page for any browser, or a picture");
-  reporter->add_option("FILE", report_options.file, measured_file)->required();
-  reporter
-      ->add_option("--format", report_options.format,
-                   "html: the interactive page; svg or png: the Bode plot of one response")
-      ->check(CLI::IsMember({"html", "svg", "png"}))
-      ->capture_default_str();
-  reporter->add_option("-o,--output", report_options.output,
-                       "file to write (default: FILE's name with the format's extension)");
-  reporter->add_option("--channel", report_options.channel,
-                       "sensor that the picture shows (default: the first)");
-  reporter->add_flag("--force", report_options.force,
-                     "replace the file if it exists (a report is replaced anyway)");
-
+  CLI::App* reporter = add_report(app, report_options);
   FitCommandOptions fit_options;
   CLI::App* fit = add_fit(app, fit_options);
   MarginsOptions margins_options;
@@ -233,44 +175,30 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   NotchOptions notch_options;
   CLI::App* notch = add_notch(app, notch_options);
   CompareOptions compare_options;
-  CLI::App* comparer = app.add_subcommand(
-      "compare", "Tell whether measurements differ by more than their scatter explains");
-  comparer->add_option("FILES", compare_options.files, "files; the first is the reference")
-      ->required()
-      ->expected(2, -1);
-  comparer
-      ->add_option("--tolerance-db", compare_options.settings.tolerance_db,
-                   "changes of the gain up to this are none, dB")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  comparer
-      ->add_option("--tolerance-deg", compare_options.settings.tolerance_deg,
-                   "changes of the phase up to this are none, degrees")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
-  comparer
-      ->add_option("--false-alarm", compare_options.settings.false_alarm,
-                   "chance to call two equal responses different")
-      ->check(CLI::Range(1e-12, 0.5))
-      ->capture_default_str();
-  comparer->add_option("-o,--output", compare_options.output,
-                       "page that lays them over each other");
-  comparer->add_flag("--force", compare_options.force, "replace the page if it exists");
-
+  CLI::App* comparer = add_compare(app, compare_options);
   CLI::App* list = app.add_subcommand("drivers", "List the drivers of this build");
+  std::string shell;
+  CLI::App* completion = app.add_subcommand(
+      "completion", "Print the completion script of a shell: source <(sinerig completion bash)");
+  completion->add_option("SHELL", shell, "bash, zsh or fish")
+      ->required()
+      ->check(CLI::IsMember({"bash", "zsh", "fish"}));
+  CLI::App* manual =
+      app.add_subcommand("manual", "Print the manual page: sinerig manual | man -l -");
 
   try {
-    app.parse(argc, argv);
+    app.parse(arguments_of(argc, argv));
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? exit_done : exit_usage;
   }
   set_up_logging(log_level);
-  run_options.report = !no_report;
+  const bool hushed = run_options.voice != Voice::text || compare_options.voice == Voice::quiet;
+  if (hushed && log_level.empty()) spdlog::set_level(spdlog::level::warn);
 
   try {
-    if (plan->parsed()) return plan_command(rig, drivers);
+    if (plan->parsed()) return plan_command(plan_options, drivers);
     if (run->parsed()) return run_command(run_options, drivers);
-    if (show->parsed()) return show_command(file);
+    if (show->parsed()) return show_command(show_options);
     if (exporter->parsed()) return export_command(export_options);
     if (reporter->parsed()) return report_command(report_options);
     if (fit->parsed()) return fit_command(fit_options);
@@ -278,6 +206,14 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     if (notch->parsed()) return notch_command(notch_options);
     if (comparer->parsed()) return compare_command(compare_options);
     if (list->parsed()) return drivers_command(drivers);
+    if (completion->parsed()) {
+      write_completion(std::cout, app, shell);
+      return exit_done;
+    }
+    if (manual->parsed()) {
+      write_manual(std::cout, app);
+      return exit_done;
+    }
   } catch (const config::ConfigError& error) {
     spdlog::error("{}", error.what());
     return exit_usage;

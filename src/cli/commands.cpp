@@ -2,21 +2,61 @@
 
 #include <iostream>
 
+#include <nlohmann/json.hpp>
+
 #include "cli/configured_rig.h"
+#include "record/exporters.h"
 #include "record/measured.h"
 #include "report/terminal.h"
 
 namespace sinerig::cli {
 
-int plan_command(const std::string& rig_path, const std::vector<DriverKit>& drivers) {
-  const ConfiguredRig configured{rig_path, drivers};
+namespace {
+
+void print_plan_as_json(const config::Rig& rig, const SweepPlan& plan) {
+  nlohmann::ordered_json dwells = nlohmann::ordered_json::array();
+  for (const Dwell& dwell : plan.dwells) {
+    const auto seconds = [&](std::uint64_t samples) {
+      return static_cast<double>(samples) / plan.rate_hz;
+    };
+    nlohmann::ordered_json tones = nlohmann::ordered_json::array();
+    for (const Tone& tone : dwell.tones)
+      tones.push_back(
+          {{"freq_hz", dwell.tone_hz(tone, plan.rate_hz)}, {"amplitude", tone.amplitude}});
+    dwells.push_back({{"asked_hz", dwell.asked_hz},
+                      {"tones", tones},
+                      {"settle_s", seconds(dwell.settle_samples)},
+                      {"blocks", dwell.blocks},
+                      {"block_s", seconds(dwell.block_samples)},
+                      {"least_s", seconds(dwell.min_samples())},
+                      {"most_s", seconds(dwell.max_samples)}});
+  }
+  const nlohmann::ordered_json json{{"rig", rig.file->name()},      {"rate_hz", plan.rate_hz},
+                                    {"unit", rig.actuator.unit},    {"least_s", plan.min_seconds()},
+                                    {"most_s", plan.max_seconds()}, {"dwells", dwells}};
+  std::cout << json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
+}
+
+}  // namespace
+
+int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drivers) {
+  const ConfiguredRig configured{options.rig, drivers};
   const config::Rig& rig = configured.rig();
-  report::print_plan(std::cout, rig.plan(), rig.sweep, rig.actuator.unit);
+  if (options.json) {
+    print_plan_as_json(rig, rig.plan());
+  } else {
+    report::print_plan(std::cout, rig.plan(), rig.sweep, rig.actuator.unit);
+  }
   return exit_done;
 }
 
-int show_command(const std::string& file) {
-  report::print_run(std::cout, record::read_measured(file));
+int show_command(const ShowOptions& options) {
+  const record::StoredRun run = record::read_measured(options.file);
+  if (options.json) {
+    record::write_json(std::cout, run);
+  } else {
+    report::print_run(std::cout, run);
+  }
   return exit_done;
 }
 

@@ -1,9 +1,11 @@
 // The commands of the program, one function each. They throw; main catches.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "cli/loop_options.h"
 #include "drivers/device.h"
 #include "record/compare.h"
 
@@ -18,11 +20,30 @@ enum ExitCode : int {
   exit_changed = 5,      // compare: at least one point differs
 };
 
+// What a command says on standard output.
+enum class Voice {
+  text,   // for people: drawn on a terminal, plain lines elsewhere
+  quiet,  // nothing; warnings and errors on standard error remain
+  json,   // for scripts
+};
+
 struct RunOptions {
   std::string rig;
   std::string output;  // empty: NAME.sweep of the rig file, numbered when it exists
   bool force = false;
-  bool report = true;  // write NAME.html at the end
+  bool report = true;                     // write NAME.html at the end
+  Voice voice = Voice::text;              // json: one object per line, plan, points, end
+  std::optional<std::string> serve = {};  // ADDR:PORT of the live page; empty: the default
+};
+
+struct PlanOptions {
+  std::string rig;
+  bool json = false;
+};
+
+struct ShowOptions {
+  std::string file;
+  bool json = false;
 };
 
 struct ExportOptions {
@@ -37,20 +58,26 @@ struct ReportOptions {
   std::string file;
   std::string format = "html";  // html, svg or png
   std::string output;           // empty: FILE's name with the format's extension
-  std::string channel;          // of svg and png; empty: the first sensor
+  std::string channel;          // of the picture and of the loop; empty: the first sensor
+  LoopOptions loop;             // with a controller the page shows margins and a notch, too
   bool force = false;
 };
 
 struct CompareOptions {
   std::vector<std::string> files;  // the first is what the others are compared with
   record::CompareSettings settings;
-  std::string output;  // overlay as a page; empty: none
+  bool drift = false;  // resonances of the models, too; with a controller in `loop` the margins
+  LoopOptions loop;
+  std::string channel;             // of `drift`
+  double tolerance_percent = 0.0;  // of `drift`
+  std::string output;              // overlay as a page; empty: none
   bool force = false;
+  Voice voice = Voice::text;
 };
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
-int plan_command(const std::string& rig, const std::vector<DriverKit>& drivers);
-int show_command(const std::string& file);
+int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drivers);
+int show_command(const ShowOptions& options);
 int export_command(const ExportOptions& options);
 int report_command(const ReportOptions& options);
 int compare_command(const CompareOptions& options);

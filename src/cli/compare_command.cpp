@@ -3,9 +3,11 @@
 #include <filesystem>
 #include <iostream>
 
+#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "cli/drift_figures.h"
 #include "cli/output_file.h"
 #include "cli/report_file.h"
 #include "record/measured.h"
@@ -76,10 +78,29 @@ int compare_command(const CompareOptions& options) {
     throw record::SweepFileError(
         "nothing to compare: the files have no frequency in common at which both points are good");
   }
-  report::print_comparison(std::cout, runs.front().label, differences);
+  std::vector<report::Drift> drifts;
+  if (options.drift || has_controller(options.loop)) {
+    std::vector<std::string> labels;
+    for (const report::LabelledRun& run : runs) labels.push_back(run.label);
+    drifts = drift_of(options.files, labels,
+                      {.loop = options.loop,
+                       .channel = options.channel,
+                       .false_alarm = options.settings.false_alarm,
+                       .tolerance = 0.01 * options.tolerance_percent});
+  }
+  for (const report::Drift& drift : drifts) changed = changed || drift.changed();
+
+  if (options.voice == Voice::text) {
+    report::print_comparison(std::cout, runs.front().label, differences);
+    for (const report::Drift& drift : drifts)
+      report::print_drift(std::cout, runs.front().label, drift);
+  } else if (options.voice == Voice::json) {
+    std::cout << report::comparison_json(runs.front().label, differences, drifts).dump(1) << '\n';
+  }
   if (!options.output.empty()) {
-    write_file(options.output, options.force || is_report(options.output),
-               [&](std::ostream& stream) { report::write_html(stream, runs, differences); });
+    write_file(
+        options.output, options.force || is_report(options.output),
+        [&](std::ostream& stream) { report::write_html(stream, runs, differences, drifts); });
     spdlog::info("wrote {}", options.output);
   }
   return changed ? exit_changed : exit_done;

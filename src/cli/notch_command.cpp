@@ -9,7 +9,6 @@
 #include <stdexcept>
 
 #include "cli/commands.h"
-#include "report/notch_report.h"
 
 namespace sinerig::cli {
 
@@ -119,7 +118,7 @@ std::pair<int, int> fixed_format(const std::string& text) {
 
 }  // namespace
 
-int notch_command(const NotchOptions& options) {
+NotchedLoop design_notches(const NotchOptions& options) {
   if (!options.loop.controller_file.empty())
     throw std::invalid_argument("notch needs the controller as a transfer function or PID");
   std::vector<PlantModel> plants;
@@ -131,7 +130,8 @@ int notch_command(const NotchOptions& options) {
   LoopOptions loop_options = options.loop;
   if (!loop_options.rate_hz && plant.measured.rate_hz > 0.0)
     loop_options.rate_hz = plant.measured.rate_hz;
-  identify::LoopModel loop = model_loop(loop_options, plant);
+  const identify::LoopModel bare = model_loop(loop_options, plant);
+  identify::LoopModel loop = bare;
   report::NotchReport report;
   report.label = plant.measured.label;
   report.controller = controller_text(options.loop);
@@ -153,7 +153,11 @@ int notch_command(const NotchOptions& options) {
     report.notches.push_back(designed);
   }
   if (closed) report.after = report::NotchReport::Loop{figures, loop.closed_loop_stable()};
+  return {.report = report, .before = bare, .after = loop};
+}
 
+int notch_command(const NotchOptions& options) {
+  const report::NotchReport report = design_notches(options).report;
   if (options.format == "json")
     std::cout << report::notch_json(report) << '\n';
   else if (options.format == "c")

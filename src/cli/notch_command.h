@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "cli/loop_options.h"
+#include "identify/loop_model.h"
+#include "report/notch_report.h"
 
 namespace sinerig::cli {
 
@@ -22,8 +24,16 @@ struct NotchOptions {
   bool refit = false;
 };
 
+struct NotchedLoop {
+  report::NotchReport report;
+  identify::LoopModel before;
+  identify::LoopModel after;  // with the notches in it
+};
+
 // Throws as fit_command does, and std::invalid_argument for a mode that is not there or a notch
 // that cannot be had.
+NotchedLoop design_notches(const NotchOptions& options);
+
 int notch_command(const NotchOptions& options);
 
 }  // namespace sinerig::cli

@@ -2,10 +2,12 @@
 #include <ostream>
 #include <sstream>
 
+#include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
 #include "cli/chosen_response.h"
 #include "cli/commands.h"
+#include "cli/loop_panel.h"
 #include "cli/output_file.h"
 #include "cli/report_file.h"
 #include "record/measured.h"
@@ -25,7 +27,11 @@ constexpr double png_scale = 2.0;  // pixels per unit of the picture: sharp on p
 int report_command(const ReportOptions& options) {
   if (options.format == "html") {
     const std::string path = options.output.empty() ? report_path(options.file) : options.output;
-    write_report(options.file, path, options.force);
+    // First, because a model that has to be fitted goes into the sweep file that is reported.
+    const nlohmann::ordered_json loop =
+        has_controller(options.loop) ? loop_panel(options.file, options.channel, options.loop)
+                                     : nlohmann::ordered_json{};
+    write_report(options.file, path, options.force, loop);
     spdlog::info("wrote {}", path);
     return exit_done;
   }

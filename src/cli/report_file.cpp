@@ -23,11 +23,12 @@ bool is_report(const std::string& path) {
   return head.find("<meta name=\"generator\" content=\"sinerig ") != std::string::npos;
 }
 
-void write_report(const std::string& sweep_file, const std::string& path, bool force) {
+void write_report(const std::string& sweep_file, const std::string& path, bool force,
+                  const nlohmann::ordered_json& loop) {
   const report::LabelledRun run{.label = fs::path{sweep_file}.stem().string(),
                                 .run = record::read_measured(sweep_file)};
   write_file(path, force || is_report(path),
-             [&](std::ostream& stream) { report::write_html(stream, run); });
+             [&](std::ostream& stream) { report::write_html(stream, run, loop); });
 }
 
 }  // namespace sinerig::cli

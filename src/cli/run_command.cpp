@@ -1,19 +1,17 @@
 #include <atomic>
-#include <csignal>
 #include <filesystem>
-#include <iostream>
 #include <mutex>
 #include <thread>
-#include <unistd.h>
 
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
+#include "cli/live_view.h"
 #include "cli/report_file.h"
+#include "cli/run_teller.h"
+#include "cli/stop_on_signal.h"
 #include "record/recorder.h"
-#include "record/sweep_reader.h"
-#include "report/terminal.h"
 #include "sweep/outbox.h"
 #include "sweep/runner.h"
 
@@ -28,44 +26,6 @@ constexpr std::size_t outbox_slots = 1U << 16U;
 constexpr std::size_t outbox_backlog = 1U << 14U;
 
 constexpr std::chrono::milliseconds progress_interval{50};
-
-// Set by the signal handler, read by the loop on every tick.
-std::atomic<RunControl*> running{nullptr};
-
-void count_stop_request(int /*signal*/) {
-  if (RunControl* control = running.load()) control->stop_requests.fetch_add(1);
-}
-
-// SIGINT, SIGTERM and SIGHUP become stop requests for as long as this lives. A reader of the output
-// that goes away (SIGPIPE) is no reason to leave an actuator where it is.
-class StopOnSignal {
- public:
-  explicit StopOnSignal(RunControl& control) {
-    running = &control;
-    struct sigaction action {};
-    action.sa_handler = count_stop_request;
-    sigaction(SIGINT, &action, &old_int_);
-    sigaction(SIGTERM, &action, &old_term_);
-    sigaction(SIGHUP, &action, &old_hup_);
-    action.sa_handler = SIG_IGN;
-    sigaction(SIGPIPE, &action, &old_pipe_);
-  }
-  ~StopOnSignal() {
-    sigaction(SIGINT, &old_int_, nullptr);
-    sigaction(SIGTERM, &old_term_, nullptr);
-    sigaction(SIGHUP, &old_hup_, nullptr);
-    sigaction(SIGPIPE, &old_pipe_, nullptr);
-    running = nullptr;
-  }
-  StopOnSignal(const StopOnSignal&) = delete;
-  StopOnSignal& operator=(const StopOnSignal&) = delete;
-
- private:
-  struct sigaction old_int_ {};
-  struct sigaction old_term_ {};
-  struct sigaction old_hup_ {};
-  struct sigaction old_pipe_ {};
-};
 
 // rig.sweep in the working directory, or rig-2.sweep … when that exists.
 std::string default_output(const std::string& rig, bool force) {
@@ -108,13 +68,23 @@ class PointInbox {
   std::vector<Point> points_;
 };
 
-// The loop on its own thread, progress on this one, until both the loop and the recorder are done.
+// Who hears of a run: the terminal, a script, the live page. Each may be absent.
+struct Audience {
+  RunTeller& teller;
+  LiveView* view;
+  record::Recorder::Samples samples;
+};
+
+// The loop on its own thread, its story told on this one, until both the loop and the recorder are
+// done.
 RunOutcome play(SweepRunner& runner, RunControl& control, Outbox& outbox,
-                record::SweepWriter& writer, report::Progress& progress) {
+                record::SweepWriter& writer, const Audience& audience) {
   PointInbox inbox;
-  record::Recorder recorder{outbox, writer, [&](const Record& record) {
-                              inbox.put(record);
-                            }};
+  const auto observe = [&](const Record& record) {
+    inbox.put(record);
+    if (audience.view != nullptr) audience.view->run().take(record);
+  };
+  record::Recorder recorder{outbox, writer, observe, audience.samples};
   RunOutcome outcome;
   std::atomic<bool> done{false};
   std::thread loop{[&] {
@@ -123,18 +93,18 @@ RunOutcome play(SweepRunner& runner, RunControl& control, Outbox& outbox,
     done.store(true);
     done.notify_one();
   }};
-  const auto show = [&] {
-    for (const Point& point : inbox.take()) progress.point(point);
-    progress.update(control.dwell.load());
+  const auto tell = [&] {
+    for (const Point& point : inbox.take()) audience.teller.point(point);
+    audience.teller.update(control.dwell.load(), control.tick.load());
   };
   while (!done.load()) {
-    show();
+    tell();
     std::this_thread::sleep_for(progress_interval);
   }
   loop.join();
   recorder.finish();
-  show();
-  progress.close();
+  tell();
+  audience.teller.close();
   return outcome;
 }
 
@@ -148,15 +118,26 @@ int exit_code(const RunOutcome& outcome) {
   return outcome.trip.cause == TripCause::stop_requested ? exit_interrupted : exit_stopped;
 }
 
-// The run is safe in its file: a report that cannot be written is a warning.
-void report_beside(const std::string& sweep_file) {
+// The run is safe in its file: a report that cannot be written is a warning. The path, empty then.
+std::string report_beside(const std::string& sweep_file) {
   const std::string path = report_path(sweep_file);
   try {
     write_report(sweep_file, path, false);
-    spdlog::info("wrote {}, the report: open it in a browser", path);
+    return path;
   } catch (const std::exception& error) {
     spdlog::warn("no report: {}", error.what());
+    return {};
   }
+}
+
+// Why the run was stopped, in words; empty where it was not.
+std::string reason_of(const RunOutcome& outcome, const ConfiguredRig& configured) {
+  if (!outcome.trip.tripped()) return {};
+  std::string reason = describe(outcome.trip, configured.rig().sensor_names());
+  const bool by_device = outcome.trip.cause == TripCause::actuator_fault ||
+                         outcome.trip.cause == TripCause::channel_age;
+  if (by_device && !configured.fault_reason().empty()) reason += ": " + configured.fault_reason();
+  return reason;
 }
 
 }  // namespace
@@ -166,10 +147,16 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const config::Rig& rig = configured.rig();
   const SweepPlan plan = rig.plan();
   Clock& clock = configured.clock();
-  spdlog::info("{}, {} of bench time", report::plan_size_text(plan), report::bench_time_text(plan));
-
+  RunControl control;
+  const StopOnSignal stop_on_signal{control};
   const std::string path =
       options.output.empty() ? default_output(options.rig, options.force) : options.output;
+  RunTeller teller{options.voice, rig, plan};
+  const std::unique_ptr<LiveView> view =
+      options.serve ? std::make_unique<LiveView>(*options.serve, rig, plan, clock, control)
+                    : nullptr;
+  teller.plan(view ? view->url() : "");
+
   record::SweepWriter writer{path, run_info(rig, plan),
                              options.force ? record::SweepWriter::IfExists::replace
                                            : record::SweepWriter::IfExists::refuse};
@@ -177,8 +164,6 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   Outbox outbox{outbox_slots, outbox_backlog,
                 in_real_time ? Outbox::WhenFull::keep : Outbox::WhenFull::wait};
   Guard guard{rig.guard, clock.grid().period_s()};
-  RunControl control;
-  const StopOnSignal stop_on_signal{control};
   try {
     configured.open();
     configured.arm();
@@ -186,29 +171,29 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
     writer.discard();
     throw;
   }
-  SweepRunner runner{plan,  rig.runner, clock, configured.actuator(), configured.sensors(),
-                     guard, outbox};
-  report::Progress progress{std::cout, isatty(STDOUT_FILENO) != 0, plan};
-  const RunOutcome outcome = play(runner, control, outbox, writer, progress);
+  RunnerSettings settings = rig.runner;
+  if (view) settings.record_samples = true;
+  SweepRunner runner{
+      plan,  settings, view ? view->clock() : clock, configured.actuator(), configured.sensors(),
+      guard, outbox};
+  const bool keep_samples = rig.runner.record_samples || !view;
+  const RunOutcome outcome = play(runner, control, outbox, writer,
+                                  {.teller = teller,
+                                   .view = view.get(),
+                                   .samples = keep_samples ? record::Recorder::Samples::written
+                                                           : record::Recorder::Samples::watched});
 
-  std::string reason = outcome.trip.tripped() ? describe(outcome.trip, rig.sensor_names()) : "";
-  const bool by_device = outcome.trip.cause == TripCause::actuator_fault ||
-                         outcome.trip.cause == TripCause::channel_age;
-  if (by_device && !configured.fault_reason().empty()) reason += ": " + configured.fault_reason();
-  writer.set("outcome", outcome_name(outcome));
-  writer.set("outcome_detail", reason);
-  writer.set("dropped_samples", std::to_string(outbox.dropped_samples()));
+  RunEnd end{.outcome = outcome_name(outcome),
+             .reason = reason_of(outcome, configured),
+             .sweep_file = path,
+             .dropped_samples = rig.runner.record_samples ? outbox.dropped_samples() : 0};
+  writer.set("outcome", end.outcome);
+  writer.set("outcome_detail", end.reason);
+  writer.set("dropped_samples", std::to_string(end.dropped_samples));
   writer.finish();
-
-  report::print_run(std::cout, record::read_sweep(path));
-  std::cout.flush();  // before the messages on standard error
-  if (outcome.trip.tripped()) spdlog::error("{}", reason);
-  if (outbox.dropped_samples() > 0) {
-    spdlog::warn("{} samples were dropped: the disk is too slow for [output] samples",
-                 outbox.dropped_samples());
-  }
-  spdlog::info("wrote {}", path);
-  if (options.report) report_beside(path);
+  if (options.report) end.report_file = report_beside(path);
+  if (view) view->finish(end);
+  teller.end(end);
   return exit_code(outcome);
 }
 

@@ -15,8 +15,12 @@ constexpr std::chrono::seconds commit_interval{1};
 
 }  // namespace
 
-Recorder::Recorder(Outbox& outbox, SweepWriter& writer, Observer observer)
-    : outbox_{outbox}, writer_{writer}, observer_{std::move(observer)}, thread_{[this] {
+Recorder::Recorder(Outbox& outbox, SweepWriter& writer, Observer observer, Samples samples)
+    : outbox_{outbox},
+      writer_{writer},
+      observer_{std::move(observer)},
+      samples_{samples},
+      thread_{[this] {
         drain();
       }} {}
 
@@ -39,7 +43,8 @@ void Recorder::drain() {
     while (true) {
       const bool last_look = outbox_.closed();
       if (outbox_.try_take(record)) {
-        writer_.write(record);
+        if (samples_ == Samples::written || !std::holds_alternative<TickSamples>(record))
+          writer_.write(record);
         if (observer_) observer_(record);
       } else if (last_look) {
         break;

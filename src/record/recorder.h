@@ -12,11 +12,15 @@ namespace sinerig::record {
 
 class Recorder {
  public:
-  // Called on the recorder's thread for every record, after it has been written.
+  // Called on the recorder's thread for every record, after it has been written. May not throw.
   using Observer = std::function<void(const Record&)>;
 
+  // Whether samples go to the file, or to the observer only.
+  enum class Samples { written, watched };
+
   // Starts the thread. `outbox` and `writer` must outlive it.
-  Recorder(Outbox& outbox, SweepWriter& writer, Observer observer);
+  Recorder(Outbox& outbox, SweepWriter& writer, Observer observer,
+           Samples samples = Samples::written);
 
   // Joins; the outbox must have been closed or the recorder have failed.
   ~Recorder();
@@ -32,6 +36,7 @@ class Recorder {
   Outbox& outbox_;
   SweepWriter& writer_;
   Observer observer_;
+  Samples samples_;
   std::exception_ptr failure_;
   std::thread thread_;
 };

@@ -6,6 +6,8 @@
 #include <cstdio>
 #include <ostream>
 
+#include <nlohmann/json.hpp>
+
 namespace sinerig::report {
 
 namespace {
@@ -56,6 +58,41 @@ void print_comparison(std::ostream& stream, const std::string& first,
     }
     stream << verdict(difference) << "\n\n";
   }
+}
+
+nlohmann::ordered_json comparison_json(const std::string& first,
+                                       const std::vector<Difference>& differences,
+                                       const std::vector<Drift>& drifts) {
+  using Json = nlohmann::ordered_json;
+  const auto number = [](double value) {
+    return std::isfinite(value) ? Json(value) : Json();
+  };
+  bool changed = false;
+  Json list = Json::array();
+  for (const Difference& difference : differences) {
+    changed = changed || difference.changed();
+    Json points = Json::array();
+    for (const PointDifference& point : difference.points) {
+      points.push_back({{"freq_hz", point.frequency_hz},
+                        {"gain_db", number(point.gain_db)},
+                        {"gain95_db", number(point.gain95_db)},
+                        {"phase_deg", number(point.phase_deg)},
+                        {"phase95_deg", number(point.phase95_deg)},
+                        {"p", number(point.probability)},
+                        {"changed", point.changed}});
+    }
+    list.push_back({{"name", difference.name},
+                    {"changed", difference.changed()},
+                    {"unmatched", difference.unmatched},
+                    {"unusable", difference.unusable},
+                    {"points", points}});
+  }
+  Json drift = Json::array();
+  for (const Drift& each : drifts) {
+    changed = changed || each.changed();
+    drift.push_back(drift_json(each));
+  }
+  return {{"reference", first}, {"changed", changed}, {"differences", list}, {"drift", drift}};
 }
 
 }  // namespace sinerig::report

@@ -5,7 +5,10 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json_fwd.hpp>
+
 #include "record/compare.h"
+#include "report/drift.h"
 
 namespace sinerig::report {
 
@@ -13,5 +16,10 @@ namespace sinerig::report {
 // file that the others are compared with.
 void print_comparison(std::ostream& stream, const std::string& first,
                       const std::vector<record::Difference>& differences);
+
+// {reference, changed, differences: [{name, changed, unmatched, unusable, points}], drift}.
+nlohmann::ordered_json comparison_json(const std::string& first,
+                                       const std::vector<record::Difference>& differences,
+                                       const std::vector<Drift>& drifts);
 
 }  // namespace sinerig::report

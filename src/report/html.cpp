@@ -71,15 +71,26 @@ void write_page(std::ostream& stream, const nlohmann::ordered_json& data,
 
 }  // namespace
 
-void write_html(std::ostream& stream, const LabelledRun& run) {
+void write_html(std::ostream& stream, const LabelledRun& run, const nlohmann::ordered_json& loop) {
   std::ostringstream picture;
   if (!run.run.responses.empty()) write_bode_svg(picture, run, run.run.responses.front());
-  write_page(stream, page_of_run(run), picture.str());
+  nlohmann::ordered_json page = page_of_run(run);
+  page["loop"] = loop;
+  write_page(stream, page, picture.str());
 }
 
 void write_html(std::ostream& stream, const std::vector<LabelledRun>& runs,
-                const std::vector<record::Difference>& differences) {
-  write_page(stream, page_of_comparison(runs, differences), "");
+                const std::vector<record::Difference>& differences,
+                const std::vector<Drift>& drifts) {
+  nlohmann::ordered_json page = page_of_comparison(runs, differences);
+  page["drift"] = nlohmann::ordered_json::array();
+  bool moved = false;
+  for (const Drift& drift : drifts) {
+    moved = moved || drift.changed();
+    page["drift"].push_back(drift_json(drift));
+  }
+  if (moved) page["outcome"] = page["outcome_text"] = "changed";
+  write_page(stream, page, "");
 }
 
 }  // namespace sinerig::report

@@ -102,28 +102,12 @@ Json more_json(const std::vector<StoredPoint>& points) {
 
 Json response_json(const StoredRun& run, const StoredResponse& response, const std::string& name,
                    std::size_t run_index) {
-  const std::vector<StoredPoint>& points = response.points;
   Json json{{"run", run_index},
             {"name", name},
             {"unit", response_unit(run, response)},
             {"input_unit", run.channels.at(response.input).unit},
             {"output_unit", run.channels.at(response.output).unit}};
-  json["f"] = column(points, 9, [](const auto& p) { return p.frequency_hz; });
-  json["re"] = column(points, 9, [](const auto& p) { return p.response.real(); });
-  json["im"] = column(points, 9, [](const auto& p) { return p.response.imag(); });
-  json["var_re"] = column(points, 4, [](const auto& p) { return p.covariance.re_re; });
-  json["cov_re_im"] = column(points, 4, [](const auto& p) { return p.covariance.re_im; });
-  json["var_im"] = column(points, 4, [](const auto& p) { return p.covariance.im_im; });
-  json["gain95"] = column(points, 5, [](const auto& p) { return half_width95(p).gain; });
-  json["phase95"] = column(points, 5, [](const auto& p) { return half_width95(p).phase_rad; });
-  json["snr"] = column(points, 5, [](const auto& p) { return p.snr_db; });
-  json["amplitude"] = column(points, 6, [](const auto& p) { return p.input_amplitude; });
-  json["response"] = column(points, 6, [](const auto& p) { return p.output_amplitude; });
-  json["distortion"] = column(points, 5, [](const auto& p) { return p.distortion; });
-  json["samples"] = column(points, 8, [](const auto& p) { return p.samples; });
-  json["status"] = texts(points, [](const auto& p) { return p.status; });
-  json["reason"] = texts(points, [](const auto& p) { return p.reason; });
-  json["extra"] = more_json(points);
+  json.update(point_columns(response.points));
   json["models"] = models_json(run, response);
   return json;
 }
@@ -178,6 +162,27 @@ std::string response_unit(const StoredRun& run, const StoredResponse& response) 
   if (input == output) return "1";
   if (input == "1" || input.empty()) return output;
   return (output.empty() ? "1" : bracketed(output)) + "/" + bracketed(input);
+}
+
+Json point_columns(const std::vector<StoredPoint>& points) {
+  Json json = Json::object();
+  json["f"] = column(points, 9, [](const auto& p) { return p.frequency_hz; });
+  json["re"] = column(points, 9, [](const auto& p) { return p.response.real(); });
+  json["im"] = column(points, 9, [](const auto& p) { return p.response.imag(); });
+  json["var_re"] = column(points, 4, [](const auto& p) { return p.covariance.re_re; });
+  json["cov_re_im"] = column(points, 4, [](const auto& p) { return p.covariance.re_im; });
+  json["var_im"] = column(points, 4, [](const auto& p) { return p.covariance.im_im; });
+  json["gain95"] = column(points, 5, [](const auto& p) { return half_width95(p).gain; });
+  json["phase95"] = column(points, 5, [](const auto& p) { return half_width95(p).phase_rad; });
+  json["snr"] = column(points, 5, [](const auto& p) { return p.snr_db; });
+  json["amplitude"] = column(points, 6, [](const auto& p) { return p.input_amplitude; });
+  json["response"] = column(points, 6, [](const auto& p) { return p.output_amplitude; });
+  json["distortion"] = column(points, 5, [](const auto& p) { return p.distortion; });
+  json["samples"] = column(points, 8, [](const auto& p) { return p.samples; });
+  json["status"] = texts(points, [](const auto& p) { return p.status; });
+  json["reason"] = texts(points, [](const auto& p) { return p.reason; });
+  json["extra"] = more_json(points);
+  return json;
 }
 
 Json page_of_run(const LabelledRun& labelled) {

@@ -23,6 +23,10 @@ std::string response_name(const record::StoredRun& run, const record::StoredResp
 // Unit of H: "rad/Nm", "(rad/s)/Nm", "1" where both channels have the same.
 std::string response_unit(const record::StoredRun& run, const record::StoredResponse& response);
 
+// The figures of points as columns, each named as the page knows it; every column has one entry per
+// point, null where there is no number.
+nlohmann::ordered_json point_columns(const std::vector<record::StoredPoint>& points);
+
 // The page of one run.
 nlohmann::ordered_json page_of_run(const LabelledRun& run);
 

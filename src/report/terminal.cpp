@@ -46,13 +46,6 @@ std::string break_points(const SweepSettings& sweep) {
   return lines;
 }
 
-std::string point_text(double frequency_hz, std::complex<double> response, const char* status,
-                       const char* reason) {
-  return text("%10.4f Hz  %9.3f dB  %8.2f°  %s%s%s", frequency_hz,
-              20.0 * std::log10(std::abs(response)), std::arg(response) * degrees_per_radian,
-              status, *reason == '\0' ? "" : ": ", reason);
-}
-
 std::string lengths(const Dwell& dwell, double rate_hz) {
   return text(" %9.3f %7u %9.4f %10.3f %10.3f", seconds_of(dwell.settle_samples, rate_hz),
               dwell.blocks, seconds_of(dwell.block_samples, rate_hz),
@@ -67,9 +60,14 @@ std::string duration_text(double seconds) {
   return text("%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
 }
 
-std::string plan_size_text(const SweepPlan& plan) {
+std::size_t point_count(const SweepPlan& plan) {
   std::size_t points = 0;
   for (const Dwell& dwell : plan.dwells) points += dwell.tones.size();
+  return points;
+}
+
+std::string plan_size_text(const SweepPlan& plan) {
+  const std::size_t points = point_count(plan);
   const std::string size = text("%zu points", points);
   return points == plan.dwells.size() ? size : size + text(" in %zu dwells", plan.dwells.size());
 }
@@ -168,47 +166,6 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
   for (const record::StoredEvent& event : run.events) {
     if (!event.detail.empty()) stream << "\n" << event.kind << ": " << event.detail << '\n';
   }
-}
-
-Progress::Progress(std::ostream& stream, bool terminal, const SweepPlan& plan)
-    : stream_{stream}, terminal_{terminal}, plan_{plan}, start_{std::chrono::steady_clock::now()} {}
-
-void Progress::point(const Point& point) {
-  if (point.tone != 0 || point.pair != 0) return;
-  last_point_ = point_text(point.frequency_hz, point.response, to_string(point.status),
-                           to_string(point.reason));
-  if (!terminal_) {
-    stream_ << text("%4u/%zu ", point.dwell + 1, plan_.dwells.size()) << last_point_ << std::endl;
-  }
-}
-
-// How much is done is counted in the least that each dwell takes; what the finished ones took on
-// top tells the rest.
-void Progress::update(std::uint32_t dwell) {
-  if (!terminal_) return;
-  constexpr int width = 30;
-  std::uint64_t done_samples = 0;
-  for (std::size_t i = 0; i < std::min<std::size_t>(dwell, plan_.dwells.size()); ++i) {
-    done_samples += plan_.dwells[i].min_samples();
-  }
-  const double done = static_cast<double>(done_samples) / static_cast<double>(plan_.min_samples());
-  const double elapsed_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  const double remaining_s = done > 0.0 ? elapsed_s * (1.0 - done) / done : plan_.min_seconds();
-  const int filled = static_cast<int>(done * width);
-  const std::size_t number = std::min<std::size_t>(dwell, plan_.dwells.size() - 1);
-  std::string bar;
-  for (int i = 0; i < width; ++i) bar += i < filled ? "█" : "░";
-  stream_ << "\r\033[K" << bar
-          << text(" %zu/%zu  %.4g Hz  %s elapsed, %s left", number + 1, plan_.dwells.size(),
-                  plan_.dwells[number].frequency_hz(plan_.rate_hz),
-                  duration_text(elapsed_s).c_str(), duration_text(remaining_s).c_str());
-  if (!last_point_.empty()) stream_ << "  last " << last_point_;
-  stream_ << std::flush;
-}
-
-void Progress::close() {
-  if (terminal_) stream_ << "\r\033[K" << std::flush;
 }
 
 }  // namespace sinerig::report

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "record/sweep_reader.h"
 #include "support/program.h"
@@ -157,6 +158,35 @@ TEST_F(Exchange, CompareTellsByItsExitCode) {
   const auto nothing = workshop_.sinerig("compare axis.sweep far.csv");
   EXPECT_EQ(nothing.exit_code, 1);
   EXPECT_THAT(nothing.errors, HasSubstr("nothing to compare"));
+}
+
+// One of two resonances lies 0.4 Hz lower: that, and what follows from it, is what is said.
+TEST_F(Exchange, CompareTellsTheDriftOfResonancesAndMargins) {
+  const std::string gimbal = SINERIG_SOURCE_DIR "/config/gimbal.toml";
+  workshop_.shell("sed 's/^frequency_hz = 23.0/frequency_hz = 22.6/; s/^seed = 1/seed = 2/' " +
+                  gimbal + " > soft.toml");
+  workshop_.shell("sed 's/^seed = 1/seed = 3/' " + gimbal + " > again.toml");
+  for (const std::string& rig : {gimbal, std::string{"soft.toml"}, std::string{"again.toml"}})
+    ASSERT_EQ(workshop_.sinerig("run --quiet --no-report " + rig).exit_code, 0) << rig;
+
+  const auto soft = workshop_.sinerig("compare gimbal.sweep soft.sweep --pid 3,3,0.15,10 --json");
+  EXPECT_EQ(soft.exit_code, 5) << soft.errors;
+  const auto figures = nlohmann::json::parse(soft.output)["drift"][0]["figures"];
+  ASSERT_EQ(figures.size(), 9U);
+  EXPECT_EQ(figures[0]["name"], "resonance at 23 Hz");
+  EXPECT_NEAR(figures[0]["change"].get<double>(), -0.4, figures[0]["change95"].get<double>());
+  EXPECT_TRUE(figures[0]["changed"].get<bool>());
+  EXPECT_EQ(figures[2]["name"], "resonance at 90 Hz");
+  EXPECT_FALSE(figures[2]["changed"].get<bool>()) << figures[2];
+  EXPECT_EQ(figures[5]["name"], "phase margin");
+
+  const auto again = workshop_.sinerig("compare gimbal.sweep again.sweep --drift -o both.html");
+  EXPECT_EQ(again.exit_code, 0) << again.output;
+  EXPECT_THAT(again.output, HasSubstr("same: no change of the model"));
+  EXPECT_THAT(workshop_.read("both.html"), HasSubstr("\"drift\":[{\"name\":\"again\""));
+  const auto quiet = workshop_.sinerig("compare gimbal.sweep soft.sweep --quiet --drift");
+  EXPECT_EQ(quiet.exit_code, 5);
+  EXPECT_EQ(quiet.output + quiet.errors, "");
 }
 
 TEST_F(Exchange, CommandsTakeFilesMeasuredElsewhere) {

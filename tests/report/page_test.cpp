@@ -8,6 +8,7 @@
 
 #include "report/html.h"
 #include "support/browser.h"
+#include "support/program.h"
 #include "support/stored_runs.h"
 
 namespace sinerig::report {
@@ -196,6 +197,32 @@ TEST_F(Page, ShowsAModelWithItsResidual) {
       "");
   EXPECT_TRUE(browser_->evaluate("!!document.querySelector('#poles-0 svg')").get<bool>());
   keep_picture("model");
+  expect_no_errors();
+}
+
+// A real run, fitted by the program, with a controller.
+TEST_F(Page, ShowsTheLoopWithItsMarginsAndTheNotch) {
+  const test::Workshop workshop;
+  ASSERT_EQ(workshop.sinerig("run " SINERIG_SOURCE_DIR "/config/gimbal.toml --quiet --no-report")
+                .exit_code,
+            0);
+  const auto report = workshop.sinerig("report gimbal.sweep --pid 3,3,0.15,10");
+  ASSERT_EQ(report.exit_code, 0) << report.errors;
+  browser_->open("file://" + (workshop.folder() / "gimbal.html").string(), 1440, 2900);
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#loop-gain .curve').length"), 2);
+  const auto cell = [&](int row, int column) {
+    return browser_
+        ->evaluate("document.querySelector('#margins table tbody').rows[" +
+                   std::to_string(row) + "].cells[" + std::to_string(column) + "].textContent")
+        .get<std::string>();
+  };
+  // Gain margin of the model, 15.0 dB, and with the notch, more of it.
+  EXPECT_EQ(cell(0, 1).substr(0, 2), "15") << cell(0, 1);
+  EXPECT_GT(std::stod(cell(0, 3)), 20.0) << cell(0, 3);
+  EXPECT_EQ(cell(6, 1), "stable");
+  EXPECT_NE(text("#tables").find("Proposed notch"), std::string::npos);
+  keep_picture("loop");
+  press("rad/s");
   expect_no_errors();
 }
 

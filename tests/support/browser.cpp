@@ -131,6 +131,20 @@ Json Browser::evaluate(const std::string& expression) {
   return answer.at("result").value("value", Json{});
 }
 
+bool Browser::wait_until(const std::string& expression) {
+  const std::string promise =
+      "new Promise(done => { const end = performance.now() + 30000; const look = () => { if (" +
+      expression +
+      ") done(true); else if (performance.now() > end) done(false); else setTimeout(look, 20); }; "
+      "look(); })";
+  const Json answer =
+      call("Runtime.evaluate",
+           {{"expression", promise}, {"awaitPromise", true}, {"returnByValue", true}});
+  if (answer.contains("exceptionDetails"))
+    throw std::runtime_error(expression + ": " + answer["exceptionDetails"].dump());
+  return answer.at("result").value("value", false);
+}
+
 void Browser::mouse(const char* type, double x, double y, int buttons, int clicks) {
   call("Input.dispatchMouseEvent", {{"type", type},
                                     {"x", x},

@@ -30,6 +30,9 @@ class Browser {
   // The value of a JavaScript expression in the page. Throws std::runtime_error when it throws.
   nlohmann::json evaluate(const std::string& expression);
 
+  // Returns as soon as the expression is true in the page, false after half a minute.
+  bool wait_until(const std::string& expression);
+
   void move_mouse(double x, double y);
   void click(double x, double y);
   void double_click(double x, double y);

@@ -75,6 +75,7 @@ class Program {
     return line;
   }
   void send(int signal) const { kill(pid_, signal); }
+  pid_t pid() const { return pid_; }
   void close_output() {
     if (out_ >= 0) close(out_);
     out_ = -1;

@@ -112,6 +112,10 @@ function build() {
         ),
       );
     }
+    if (page.loop) {
+      loopPlots(bode);
+      bode.insertAdjacentHTML('beforeend', marginsPanel());
+    }
     new Nyquist(plane);
     for (const r of page.responses)
       for (const m of r.models) if (m.poles.length) new PoleZeroMap(plane, r, m);
@@ -146,5 +150,3 @@ function build() {
     redraw();
   });
 }
-
-build();

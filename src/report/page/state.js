@@ -46,9 +46,13 @@ function unwrapped(re, im) {
   });
 }
 
-for (const r of page.responses) {
+function derive(r) {
   r.abs = r.re.map((x, i) => (x === null ? null : Math.hypot(x, r.im[i])));
   r.arg = unwrapped(r.re, r.im);
+}
+
+for (const r of page.responses) {
+  derive(r);
   for (const model of r.models) {
     model.abs = model.re.map((x, i) => Math.hypot(x, model.im[i]));
     model.arg = unwrapped(model.re, model.im);
@@ -93,7 +97,7 @@ const gainHigh = r =>
   r.abs.map((v, i) => (v === null || r.gain95[i] === null ? null : inGain(v * (1 + r.gain95[i]))));
 
 const fullRange = () => {
-  const all = page.responses.flatMap(r => r.f);
+  const all = page.range || page.responses.flatMap(r => r.f);
   if (!all.length) return [1, 10];
   const lo = Math.min(...all),
     hi = Math.max(...all);

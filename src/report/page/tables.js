@@ -143,7 +143,7 @@ function writeTables(host) {
     [...host.querySelectorAll('details[open] > summary')].map(s => s.firstChild.textContent),
   );
   const first = !host.innerHTML;
-  let html = '';
+  let html = loopSections() + driftSections();
   for (const r of shownResponses())
     html += section('Points of ' + r.name, count(r.f.length, 'point', 'points'), pointsTable(r), false);
   for (const d of page.differences) {
@@ -203,7 +203,7 @@ function writeTables(host) {
   }
   host.innerHTML = html;
   for (const details of host.querySelectorAll('details')) {
-    if (opened.has(details.querySelector('summary').firstChild.textContent)) details.open = true;
+    if (!first) details.open = opened.has(details.querySelector('summary').firstChild.textContent);
   }
   for (const row of host.querySelectorAll('.points tbody tr')) {
     row.addEventListener('click', () => {

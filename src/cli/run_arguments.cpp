@@ -1,0 +1,55 @@
+#include "cli/run_arguments.h"
+
+#include <algorithm>
+
+#include "dashboard/address.h"
+
+namespace sinerig::cli {
+
+CLI::App* add_plan(CLI::App& app, PlanOptions& options) {
+  CLI::App* plan = app.add_subcommand(
+      "plan", "Print every dwell of a rig file and the total duration; refuse what can't be run");
+  plan->add_option("RIG", options.rig, "rig file (TOML)")->required();
+  plan->add_flag("--json", options.json, "print one JSON object");
+  return plan;
+}
+
+CLI::App* add_run(CLI::App& app, RunOptions& options) {
+  CLI::App* run = app.add_subcommand("run", "Run the sweep of a rig file and write a sweep file");
+  run->add_option("RIG", options.rig, "rig file (TOML)")->required();
+  run->add_option(
+      "-o,--output", options.output,
+      "sweep file to write (default: RIG's name + .sweep, here; numbered when it exists)");
+  run->add_flag("--force", options.force, "replace the sweep file if it exists");
+  run->add_flag_callback(
+      "--no-report", [&options] { options.report = false; },
+      "do not write the report NAME.html at the end");
+  const std::string address = dashboard::Address{}.text();
+  run->add_flag("--serve{" + address + "}", options.serve,
+                "show the run in a browser while it goes on, with a Stop button; --serve=ADDR:PORT "
+                "for elsewhere (default " +
+                    address + ", for this machine only; port 0: any free one)");
+  CLI::Option* quiet = run->add_flag_callback(
+      "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");
+  run->add_flag_callback(
+         "--json", [&options] { options.voice = Voice::json; },
+         "print one JSON object per line: plan, points, end")
+      ->excludes(quiet);
+  return run;
+}
+
+std::vector<std::string> arguments_of(int argc, char** argv) {
+  std::vector<std::string> arguments{argv + 1, argv + argc};
+  for (std::size_t i = 0; i + 1 < arguments.size(); ++i) {
+    const std::string& next = arguments[i + 1];
+    const bool address = next.rfind("localhost", 0) == 0 ||
+                         next.find_first_not_of("0123456789abcdefABCDEF.:[]") == std::string::npos;
+    if (arguments[i] != "--serve" || next.empty() || !address) continue;
+    arguments[i] += "=" + next;
+    arguments.erase(arguments.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+  }
+  std::reverse(arguments.begin(), arguments.end());
+  return arguments;
+}
+
+}  // namespace sinerig::cli

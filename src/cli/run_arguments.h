@@ -1,0 +1,20 @@
+// The arguments of the commands that take a rig file.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "cli/commands.h"
+
+namespace sinerig::cli {
+
+CLI::App* add_plan(CLI::App& app, PlanOptions& options);
+CLI::App* add_run(CLI::App& app, RunOptions& options);
+
+// The program's arguments for CLI11, last first. `--serve` may stand alone: what follows is its
+// address only when it looks like one.
+std::vector<std::string> arguments_of(int argc, char** argv);
+
+}  // namespace sinerig::cli

@@ -1,0 +1,144 @@
+#include "dashboard/live_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+
+#include "record/confidence.h"
+#include "record/stored_point.h"
+#include "report/report_data.h"
+#include "report/run_summary.h"
+
+namespace sinerig::dashboard {
+
+namespace {
+
+Json event_json(const Event& event, const record::StoredRun& run) {
+  std::string words;
+  if (event.kind == EventKind::tripped) {
+    std::vector<std::string> sensors;
+    for (std::size_t i = first_sensor_channel; i < run.channels.size(); ++i)
+      sensors.push_back(run.channels[i].name);
+    words = describe(event.trip, sensors);
+  } else if (event.fault != Fault::none) {
+    words = to_string(event.fault);
+  } else if (event.value != 0.0) {
+    words = rounded(event.value, 6).dump();
+  }
+  const bool of_channel = event.channel > 0 && event.channel < run.channels.size();
+  return {{"tick", event.tick},
+          {"dwell", event.dwell},
+          {"kind", to_string(event.kind)},
+          {"channel", of_channel ? run.channels[event.channel].name : ""},
+          {"text", words}};
+}
+
+}  // namespace
+
+Json rounded(double value, int digits) {
+  if (!std::isfinite(value)) return nullptr;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return std::strtod(text, nullptr);
+}
+
+std::string text_of(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Json head_json(const std::string& label, const record::StoredRun& run, bool in_real_time) {
+  Json page = report::page_of_run({.label = label, .run = run});
+  page["kind"] = "live";
+  page["summary"] = Json::array();
+  double low = unlimited;
+  double high = 0.0;
+  for (const Dwell& dwell : run.plan.dwells) {
+    for (const Tone& tone : dwell.tones) {
+      low = std::min(low, dwell.tone_hz(tone, run.plan.rate_hz));
+      high = std::max(high, dwell.tone_hz(tone, run.plan.rate_hz));
+    }
+  }
+  page["range"] = {rounded(low, 9), rounded(high, 9)};
+  page["dwells"] = run.plan.dwells.size();
+  page["least_s"] = rounded(run.plan.min_seconds(), 6);
+  page["most_s"] = rounded(run.plan.max_seconds(), 6);
+  page["real_time"] = in_real_time;
+  page["channels"] = Json::array();
+  for (const record::ChannelInfo& channel : run.channels)
+    page["channels"].push_back({{"name", channel.name}, {"unit", channel.unit}});
+  page["pairs"] = Json::array();
+  for (const record::StoredResponse& response : run.responses)
+    page["pairs"].push_back({response.input, response.output});
+  return page;
+}
+
+Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) {
+  std::map<std::uint16_t, std::vector<record::StoredPoint>> points;
+  std::vector<std::uint64_t> histogram(DwellTiming::bins);
+  Json frequencies = Json::array();
+  Json latest = Json::array();
+  Json events = Json::array();
+  for (const Record& entry : entries) {
+    if (const auto* point = std::get_if<Point>(&entry)) {
+      points[point->pair].push_back(record::stored_point(*point));
+    } else if (const auto* timing = std::get_if<DwellTiming>(&entry)) {
+      // A dwell that a refinement added is not in the plan: its ticks count, it has no bar.
+      if (timing->dwell < run.plan.dwells.size()) {
+        frequencies.push_back(
+            rounded(run.plan.dwells[timing->dwell].frequency_hz(run.plan.rate_hz), 9));
+        latest.push_back(rounded(1e-3 * static_cast<double>(timing->max_lateness_ns), 4));
+      }
+      for (std::size_t bin = 0; bin < histogram.size(); ++bin)
+        histogram[bin] += timing->lateness[bin];
+    } else if (const auto* event = std::get_if<Event>(&entry)) {
+      events.push_back(event_json(*event, run));
+    }
+  }
+  Json responses = Json::array();
+  for (const auto& [pair, columns] : points) {
+    Json json = report::point_columns(columns);
+    json["r"] = pair;
+    responses.push_back(json);
+  }
+  return {{"responses", responses},
+          {"timing", {{"f", frequencies}, {"late_us", latest}, {"histogram", histogram}}},
+          {"events", events}};
+}
+
+Json headroom_json(const std::vector<Headroom>& rows) {
+  Json all = Json::array();
+  for (const Headroom& row : rows) {
+    const double nothing = std::nan("");
+    all.push_back({{"name", row.name},
+                   {"unit", row.unit},
+                   {"min", rounded(row.min, 6)},
+                   {"max", rounded(row.max, 6)},
+                   {"low", rounded(row.seen ? row.low : nothing, 5)},
+                   {"high", rounded(row.seen ? row.high : nothing, 5)},
+                   {"used", rounded(row.used(), 4)}});
+  }
+  return all;
+}
+
+Json trace_json(const Scope::Trace& trace) {
+  Json channels = Json::array();
+  for (const std::vector<double>& channel : trace.channels) {
+    Json values = Json::array();
+    for (const double value : channel) values.push_back(rounded(value, 5));
+    channels.push_back(std::move(values));
+  }
+  return {{"step_s", rounded(trace.step_s, 9)}, {"channels", channels}};
+}
+
+Json estimate_json(const std::optional<RunningEstimate::Value>& value) {
+  if (!value) return nullptr;
+  return {{"blocks", value->blocks},
+          {"re", rounded(value->response.real(), 8)},
+          {"im", rounded(value->response.imag(), 8)},
+          {"gain95_db", rounded(value->gain_interval_db, 4)},
+          {"phase95_deg", rounded(value->phase_interval_deg, 4)}};
+}
+
+}  // namespace sinerig::dashboard

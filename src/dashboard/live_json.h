@@ -1,0 +1,35 @@
+// The messages of the live page as JSON, in the words that the page of a report uses.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "dashboard/running_estimate.h"
+#include "dashboard/scope.h"
+#include "record/sweep_reader.h"
+
+namespace sinerig::dashboard {
+
+using Json = nlohmann::ordered_json;
+
+// To so many significant digits; null where there is no number.
+Json rounded(double value, int digits);
+
+// One line; bytes that are no UTF-8 are replaced.
+std::string text_of(const Json& json);
+
+// The page's data without a point: what a report has, and `range` (Hz), `dwells`, `least_s`,
+// `most_s`, `channels`, `pairs` (input and output channel of each response).
+Json head_json(const std::string& label, const record::StoredRun& run, bool in_real_time);
+
+// {responses: [{r, columns…}], timing: {f, late_us, histogram}, events}.
+Json log_json(const std::vector<Record>& entries, const record::StoredRun& run);
+
+Json headroom_json(const std::vector<Headroom>& rows);
+Json trace_json(const Scope::Trace& trace);
+Json estimate_json(const std::optional<RunningEstimate::Value>& value);
+
+}  // namespace sinerig::dashboard

@@ -1,0 +1,187 @@
+#include "dashboard/live_run.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "dashboard/live_json.h"
+#include "record/stored_point.h"
+#include "report/report_data.h"
+
+namespace sinerig::dashboard {
+
+namespace {
+
+// Entries in one message: some 100 kB.
+constexpr std::size_t most_in_message = 256;
+
+// A flood of gaps or faults is counted by the loop; a page needs no more of them than this.
+constexpr std::size_t most_events = 2000;
+
+std::vector<std::string> names_of(const record::StoredRun& run) {
+  std::vector<std::string> names;
+  for (const record::ChannelInfo& channel : run.channels) names.push_back(channel.name);
+  return names;
+}
+
+std::vector<std::string> units_of(const record::StoredRun& run) {
+  std::vector<std::string> units;
+  for (const record::ChannelInfo& channel : run.channels) units.push_back(channel.unit);
+  return units;
+}
+
+// Two cycles of this are two of the slowest tone.
+double lowest_hz(const Dwell& dwell, double rate_hz) {
+  double lowest = dwell.frequency_hz(rate_hz);
+  for (const Tone& tone : dwell.tones) lowest = std::min(lowest, dwell.tone_hz(tone, rate_hz));
+  return lowest;
+}
+
+double planned_amplitude(const SweepPlan& plan, std::uint32_t dwell) {
+  return dwell < plan.dwells.size() ? plan.dwells[dwell].tones.front().amplitude : 0.0;
+}
+
+}  // namespace
+
+// What status() needs, copied while the lock is held, turned into text after.
+struct LiveRun::Moment {
+  std::uint32_t dwell = 0;
+  double amplitude = 0.0;
+  std::uint32_t retries = 0;
+  double elapsed_s = 0.0;
+  double remaining_s = 0.0;
+  double done = 0.0;
+  double dwell_s = 0.0;
+  std::vector<Headroom> headroom;
+  Scope::Trace trace;
+  std::vector<std::optional<RunningEstimate::Value>> estimates;
+};
+
+LiveRun::LiveRun(LiveSetup setup, const Lateness& lateness)
+    : setup_{std::move(setup)},
+      lateness_{lateness},
+      head_{std::make_shared<const std::string>(
+          text_of(head_json(setup_.label, setup_.run, setup_.in_real_time)))},
+      level_{planned_amplitude(setup_.run.plan, 0)},
+      scope_{setup_.run.channels.size(), setup_.limits, names_of(setup_.run), units_of(setup_.run),
+             setup_.run.plan.rate_hz},
+      time_{setup_.run.plan} {
+  for (const record::StoredResponse& response : setup_.run.responses) {
+    estimates_.emplace_back(static_cast<std::uint16_t>(response.input),
+                            static_cast<std::uint16_t>(response.output));
+  }
+}
+
+LiveRun::~LiveRun() = default;
+
+void LiveRun::take(const Record& record) {
+  const std::scoped_lock lock{mutex_};
+  if (const auto* samples = std::get_if<TickSamples>(&record)) {
+    scope_.add(*samples);
+    time_.update(samples->dwell, samples->tick);
+  } else if (const auto* block = std::get_if<Block>(&record)) {
+    for (RunningEstimate& estimate : estimates_) estimate.add(*block);
+  } else if (const auto* event = std::get_if<Event>(&record)) {
+    const SweepPlan& plan = setup_.run.plan;
+    if (event->kind == EventKind::dwell_began && event->dwell < plan.dwells.size()) {
+      if (event->dwell != dwell_) {
+        level_ = planned_amplitude(plan, event->dwell);
+        retries_ = 0;
+      }
+      dwell_ = event->dwell;
+      scope_.start(lowest_hz(plan.dwells[dwell_], plan.rate_hz));
+      for (RunningEstimate& estimate : estimates_) estimate.start();
+      time_.update(event->dwell, event->tick);
+      return;
+    }
+    if (event->kind == EventKind::retried) {
+      level_ = event->value;
+      ++retries_;
+    }
+    if (events_ < most_events || event->kind == EventKind::tripped) {
+      entries_.push_back(record);
+      ++events_;
+    }
+  } else {
+    entries_.push_back(record);
+  }
+}
+
+void LiveRun::finish(Ending ending) {
+  const std::scoped_lock lock{mutex_};
+  ending_ = std::make_unique<Ending>(std::move(ending));
+}
+
+Text LiveRun::log(std::size_t from, std::size_t& next) {
+  std::vector<Record> entries;
+  {
+    const std::scoped_lock lock{mutex_};
+    next = std::min(entries_.size(), from + most_in_message);
+    if (from >= next) {
+      next = from;
+      return nullptr;
+    }
+    if (cached_ && cached_from_ == from && cached_next_ == next) return cached_;
+    entries.assign(entries_.begin() + static_cast<std::ptrdiff_t>(from),
+                   entries_.begin() + static_cast<std::ptrdiff_t>(next));
+  }
+  cached_ = std::make_shared<const std::string>(text_of(log_json(entries, setup_.run)));
+  cached_from_ = from;
+  cached_next_ = next;
+  return cached_;
+}
+
+LiveRun::Moment LiveRun::moment() {
+  const std::scoped_lock lock{mutex_};
+  Moment moment{.dwell = dwell_,
+                .amplitude = level_,
+                .retries = retries_,
+                .elapsed_s = time_.elapsed_s(),
+                .remaining_s = time_.remaining_s(),
+                .done = time_.done(),
+                .dwell_s = time_.dwell_s(),
+                .headroom = scope_.headroom(),
+                .trace = scope_.trace(),
+                .estimates = {}};
+  for (const RunningEstimate& estimate : estimates_) moment.estimates.push_back(estimate.value());
+  return moment;
+}
+
+Text LiveRun::status() {
+  const Moment now = moment();
+  const SweepPlan& plan = setup_.run.plan;
+  Json json{{"dwell", now.dwell},
+            {"amplitude", rounded(now.amplitude, 5)},
+            {"retries", now.retries},
+            {"elapsed_s", rounded(now.elapsed_s, 7)},
+            {"remaining_s", rounded(now.remaining_s, 5)},
+            {"done", rounded(now.done, 5)},
+            {"dwell_s", rounded(now.dwell_s, 5)},
+            {"late_us", rounded(1e-3 * static_cast<double>(lateness_.last_ns.load()), 4)},
+            {"late_max_us", rounded(1e-3 * static_cast<double>(lateness_.max_ns.load()), 4)},
+            {"skipped", lateness_.skipped.load()}};
+  if (now.dwell < plan.dwells.size()) {
+    const Dwell& dwell = plan.dwells[now.dwell];
+    json["hz"] = rounded(dwell.frequency_hz(plan.rate_hz), 9);
+    json["tones"] = dwell.tones.size();
+    json["waiting"] = now.dwell_s * plan.rate_hz < static_cast<double>(dwell.settle_samples);
+    json["dwell_most_s"] = rounded(static_cast<double>(dwell.max_samples) / plan.rate_hz, 5);
+  }
+  json["headroom"] = headroom_json(now.headroom);
+  json["trace"] = trace_json(now.trace);
+  json["estimates"] = Json::array();
+  for (const auto& estimate : now.estimates) json["estimates"].push_back(estimate_json(estimate));
+  return std::make_shared<const std::string>(text_of(json));
+}
+
+Text LiveRun::ending() {
+  const std::scoped_lock lock{mutex_};
+  if (!ending_) return nullptr;
+  const std::string words =
+      ending_->detail.empty() ? ending_->outcome : ending_->outcome + ": " + ending_->detail;
+  return std::make_shared<const std::string>(
+      text_of({{"outcome", ending_->outcome}, {"outcome_text", words}, {"files", ending_->files}}));
+}
+
+}  // namespace sinerig::dashboard

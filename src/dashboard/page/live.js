@@ -1,0 +1,204 @@
+// The page of a run that goes on: the head with its Stop button, points as they come in, the end.
+
+const live = { ended: null, lost: false, stops: 0, log: false, tables: false, plan: null, drawn: -Infinity };
+
+function takeToken() {
+  const found = location.hash.match(/token=([0-9a-f]+)/);
+  if (found) {
+    sessionStorage.setItem('sinerig-token', found[1]);
+    history.replaceState(null, '', location.pathname);
+  }
+  return sessionStorage.getItem('sinerig-token');
+}
+const token = takeToken();
+
+function buildHead() {
+  document.title = page.title + ' – sinerig';
+  document.getElementById('head').innerHTML =
+    `<div class="title"><h1>${esc(page.title)}</h1><span class="chip" id="chip">running</span><span class="grow"></span>` +
+    `<button id="stop"${token ? '' : ' disabled title="Open the address that sinerig run printed to be able to stop."'}>Stop</button></div>` +
+    `<p class="about">${esc(page.about)}</p>` +
+    `<div class="progress"><span id="progress"></span></div><p class="where" id="where">waiting for the first tick</p>`;
+  document.getElementById('stop').addEventListener('click', stopRun);
+}
+
+async function stopRun() {
+  const button = document.getElementById('stop');
+  ++live.stops;
+  button.textContent = live.stops === 1 ? 'Stopping – press again for neutral at once' : 'Neutral at once';
+  try {
+    const answer = await fetch('stop', { method: 'POST', headers: { 'X-Sinerig-Token': token } });
+    if (!answer.ok) throw new Error(await answer.text());
+  } catch (error) {
+    button.textContent = 'Stop';
+    document.getElementById('where').textContent = `Not stopped: ${error.message} Use Ctrl-C in the terminal.`;
+  }
+}
+
+function drawHead() {
+  const s = now.status,
+    chip = document.getElementById('chip');
+  if (live.ended) {
+    chip.textContent = live.ended.outcome_text;
+    chip.className = 'chip ' + outcomeClass(live.ended.outcome);
+    document.getElementById('stop').hidden = true;
+    document.getElementById('where').textContent =
+      (s ? duration(s.elapsed_s) + ' of bench time; ' : '') +
+      (live.ended.files.length ? 'wrote ' + live.ended.files.join(' and ') : '');
+    if (live.ended.outcome === 'done') document.getElementById('progress').style.width = '100%';
+    return;
+  }
+  chip.textContent = live.lost ? 'no connection' : 'running';
+  chip.className = 'chip ' + (live.lost ? 'bad' : 'running');
+  if (!s || live.stops) return;
+  document.getElementById('progress').style.width = (100 * s.done).toFixed(2) + '%';
+  document.getElementById('where').innerHTML =
+    `<b>${Math.min(s.dwell + 1, page.dwells)}</b> of ${page.dwells} dwells` +
+    (s.hz === undefined ? '' : ` · <b>${significant(inFrequency(s.hz), 5)} ${frequencyUnit()}</b>`) +
+    ` · ${duration(s.elapsed_s)} elapsed · <b id="left">${duration(s.remaining_s)}</b> left`;
+}
+
+// Columns that belong to a point each; those in `extra` come and go.
+const ownColumns = columns => Object.keys(columns).filter(key => key !== 'r' && key !== 'extra');
+
+function append(columns) {
+  const r = page.responses[columns.r];
+  if (!r) return;
+  const before = r.f.length,
+    added = columns.f.length;
+  for (const key of ownColumns(columns)) r[key].push(...columns[key]);
+  const nothing = n => Array.from({ length: n }, () => null);
+  for (const name of new Set([...Object.keys(r.extra), ...Object.keys(columns.extra)])) {
+    r.extra[name] = (r.extra[name] || nothing(before)).concat(columns.extra[name] || nothing(added));
+  }
+  const order = r.f.map((f, i) => i).sort((a, b) => r.f[a] - r.f[b]);
+  if (order.some((k, i) => k !== i)) {
+    const sorted = values => order.map(i => values[i]);
+    for (const key of ownColumns(columns)) r[key] = sorted(r[key]);
+    for (const name of Object.keys(r.extra)) r.extra[name] = sorted(r.extra[name]);
+  }
+  derive(r);
+}
+
+function takeLog(log) {
+  log.responses.forEach(append);
+  const { timing, events } = page.runs[0];
+  timing.f.push(...log.timing.f);
+  timing.late_us.push(...log.timing.late_us);
+  log.timing.histogram.forEach((n, i) => {
+    timing.histogram[i] = (timing.histogram[i] || 0) + n;
+  });
+  events.push(...log.events);
+  live.log = true;
+}
+
+// What the dwell under way tells so far, drawn among the finished points.
+function underWay(gain) {
+  const s = now.status;
+  if (!s || live.ended || s.hz === undefined) return [];
+  return page.responses.flatMap((r, i) => {
+    const e = s.estimates[i];
+    if (!state.shown[i] || !e) return [];
+    let value = gain ? inGain(Math.hypot(e.re, e.im)) : Math.atan2(e.im, e.re);
+    if (!gain) {
+      const near = r.arg.length ? r.arg[nearest(r.f, s.hz)] : null;
+      if (near !== null && !state.wrapped) value += turn * Math.round((near - value) / turn);
+      value = inPhase(value);
+    }
+    return [{ style: colour(r), f: [s.hz], y: [value], marks: true, status: ['now'] }];
+  });
+}
+
+function withUnderWay(spec, gain) {
+  const finished = spec.layers;
+  return { ...spec, layers: () => finished().concat(underWay(gain)) };
+}
+
+// The small plots appear when there is something to show in them.
+function refreshSmall() {
+  const extras = [...new Set(page.responses.flatMap(r => Object.keys(r.extra)))];
+  const late = page.runs[0].timing.late_us.some(v => v > 0);
+  const signature = ['gain95', 'snr', 'distortion', 'amplitude', 'response']
+    .filter(has)
+    .concat(extras, late ? 'late' : '')
+    .join();
+  if (signature === live.small) return;
+  live.small = signature;
+  const host = document.getElementById('small');
+  host.innerHTML = '';
+  plots.splice(3);
+  smallPlots(host);
+}
+
+function draw(time) {
+  live.plan = null;
+  drawHead();
+  drawNow();
+  if (live.log || live.ended) {
+    live.log = false;
+    live.tables = true;
+    refreshSmall();
+    plots.forEach(plot => plot.render());
+    showReadout();
+  } else {
+    plots.slice(0, 2).forEach(plot => plot.render());
+  }
+  // Hundreds of rows are the dear part; statuses come ten times a second.
+  if (live.tables && (time - live.drawn > 1000 || live.ended)) {
+    live.drawn = time;
+    live.tables = false;
+    writeTables(document.getElementById('tables'));
+  }
+}
+
+function schedule() {
+  if (live.plan === null) live.plan = requestAnimationFrame(draw);
+}
+
+function follow() {
+  const source = new EventSource('events?since=0');
+  source.addEventListener('open', () => {
+    live.lost = false;
+    schedule();
+  });
+  source.addEventListener('log', event => {
+    takeLog(JSON.parse(event.data));
+    schedule();
+  });
+  source.addEventListener('status', event => {
+    now.status = JSON.parse(event.data);
+    schedule();
+  });
+  source.addEventListener('end', event => {
+    source.close();
+    live.ended = JSON.parse(event.data);
+    page.outcome = live.ended.outcome;
+    schedule();
+  });
+  source.addEventListener('error', () => {
+    live.lost = true;
+    schedule();
+  });
+}
+
+function buildLive() {
+  shapes.now = (x, y, r) => shapes.good(x, y, r * 1.7);
+  buildHead();
+  buildNow();
+  document.getElementById('main').innerHTML =
+    '<div class="sheet"><div class="stack" id="bode"></div><div class="stack" id="plane"></div></div><div class="small" id="small"></div><div id="tables"></div>';
+  const bode = document.getElementById('bode');
+  new Plot(bode, withUnderWay(gainPlot(), true));
+  new Plot(bode, withUnderWay(phasePlot(), false));
+  new Nyquist(document.getElementById('plane'));
+  document.getElementById('foot').innerHTML = page.notes.map(n => `<p>${esc(n)}</p>`).join('');
+  writeBar();
+  renderAll();
+  addEventListener('resize', () => {
+    plots.forEach(plot => plot.render());
+    drawNow();
+  });
+  follow();
+}
+
+buildLive();

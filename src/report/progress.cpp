@@ -1,0 +1,178 @@
+#include "report/progress.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <numbers>
+#include <ostream>
+
+#include "report/sparkline.h"
+#include "report/terminal.h"
+
+namespace sinerig::report {
+
+namespace {
+
+constexpr std::chrono::milliseconds draw_interval{100};
+constexpr std::size_t least_columns = 80;
+constexpr std::size_t plot_rows = 6;
+constexpr std::size_t label_width = 9;  // of the plot's axis
+constexpr std::size_t points_shown = 5;
+
+constexpr const char* bold = "\033[1m";
+constexpr const char* soft = "\033[2m";
+constexpr const char* green = "\033[32m";
+constexpr const char* yellow = "\033[33m";
+constexpr const char* blue = "\033[34m";
+constexpr const char* plain = "\033[0m";
+
+[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
+  char buffer[256];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(buffer, sizeof buffer, format, arguments);
+  va_end(arguments);
+  return buffer;
+}
+
+double gain_db(const Point& point) {
+  return 20.0 * std::log10(std::abs(point.response));
+}
+
+std::string status_text(const Point& point) {
+  const std::string reason = to_string(point.reason);
+  return to_string(point.status) + (reason.empty() ? "" : ": " + reason);
+}
+
+std::string line_of(const Point& point, std::size_t number, std::size_t points) {
+  constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
+  const auto half = [](const char* format, double value) {
+    return std::isfinite(value) ? text(format, value) : std::string{" ±–      "};
+  };
+  return text("%4zu/%zu %10.4f Hz  %9.3f dB", number, points, point.frequency_hz, gain_db(point)) +
+         half(" ±%-7.2g", point.gain_interval_db) +
+         text("  %8.2f°", std::arg(point.response) * degrees_per_radian) +
+         half(" ±%-7.2g", point.phase_interval_deg) + "  ";
+}
+
+}  // namespace
+
+Progress::Progress(std::ostream& stream, Style style, const SweepPlan& plan, std::size_t columns)
+    : stream_{stream},
+      style_{style == Style::live && columns < least_columns ? Style::lines : style},
+      plan_{plan},
+      columns_{std::min<std::size_t>(columns, 110)},
+      time_{plan} {}
+
+void Progress::point(const Point& point) {
+  if (point.pair != 0) return;
+  ++seen_;
+  if (point.status != PointStatus::good) ++not_good_;
+  if (style_ == Style::live) points_.push_back(point);
+  if (style_ == Style::lines)
+    stream_ << line_of(point, seen_, point_count(plan_)) << status_text(point) << std::endl;
+}
+
+void Progress::update(std::uint32_t dwell, std::uint64_t tick) {
+  time_.update(dwell, tick);
+  dwell_ = dwell;
+  if (style_ != Style::live) return;
+  const auto now = std::chrono::steady_clock::now();
+  if (now < next_) return;
+  next_ = now + draw_interval;
+  draw();
+}
+
+std::string Progress::bar(std::size_t width) const {
+  static constexpr const char* eighths[] = {"", "▏", "▎", "▍", "▌", "▋", "▊", "▉"};
+  const auto filled = static_cast<std::size_t>(time_.done() * static_cast<double>(8 * width));
+  std::string drawn = blue;
+  for (std::size_t i = 0; i < filled / 8; ++i) drawn += "█";
+  drawn += eighths[filled % 8];
+  drawn += std::string{plain} + soft;
+  for (std::size_t i = (filled + 7) / 8; i < width; ++i) drawn += "░";
+  return drawn + plain;
+}
+
+// The gain over the whole range of the plan, filling up as points come in.
+std::vector<std::string> Progress::plot(std::size_t width) const {
+  std::vector<SparklinePoint> curve;
+  double low = unlimited;
+  double high = -unlimited;
+  for (const Point& point : points_) {
+    const double gain = gain_db(point);
+    curve.push_back({std::log(point.frequency_hz), gain});
+    if (!std::isfinite(gain)) continue;
+    low = std::min(low, gain);
+    high = std::max(high, gain);
+  }
+  if (!(low <= high)) low = high = 0.0;
+  const double margin = std::max(0.5, 0.02 * (high - low));
+  low -= margin;
+  high += margin;
+  std::sort(curve.begin(), curve.end(), [](const auto& a, const auto& b) { return a.x < b.x; });
+  double first_hz = unlimited;
+  double last_hz = 0.0;
+  for (const Dwell& dwell : plan_.dwells) {
+    for (const Tone& tone : dwell.tones) {
+      first_hz = std::min(first_hz, dwell.tone_hz(tone, plan_.rate_hz));
+      last_hz = std::max(last_hz, dwell.tone_hz(tone, plan_.rate_hz));
+    }
+  }
+  std::vector<std::string> rows = sparkline(curve, width - label_width, plot_rows,
+                                            std::log(first_hz), std::log(last_hz), low, high);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::string label = i == 0                 ? text("%5.0f dB ", high)
+                              : i + 1 == rows.size() ? text("%5.0f dB ", low)
+                                                     : std::string(label_width - 1, ' ') + " ";
+    rows[i] = soft + label + "│" + plain + blue + rows[i] + plain;
+  }
+  const std::string from = text("%.4g", first_hz);
+  const std::string to = text("%.4g Hz", last_hz);
+  const std::size_t gap =
+      width - label_width - std::min(width - label_width, from.size() + to.size());
+  rows.push_back(std::string{soft} + std::string(label_width, ' ') + " " + from +
+                 std::string(gap, ' ') + to + plain);
+  return rows;
+}
+
+std::vector<std::string> Progress::picture() const {
+  const std::size_t number = std::min<std::size_t>(dwell_ + 1, plan_.dwells.size());
+  const Dwell& dwell = plan_.dwells[number - 1];
+  std::vector<std::string> lines;
+  const std::string times =
+      text("%zu/%zu  ", number, plan_.dwells.size()) + bold +
+      text("%.4g Hz", dwell.frequency_hz(plan_.rate_hz)) + plain + "  " +
+      duration_text(time_.elapsed_s()) + " elapsed, " + bold + duration_text(time_.remaining_s()) +
+      plain + " left" + (not_good_ == 0 ? "" : yellow + text(", %zu not good", not_good_) + plain);
+  lines.push_back(bar(columns_ - 66) + " " + times);
+  for (std::string& row : plot(columns_ - 2)) lines.push_back(std::move(row));
+  const std::size_t first = points_.size() - std::min(points_.size(), points_shown);
+  for (std::size_t i = first; i < first + points_shown; ++i) {
+    if (i >= points_.size()) {
+      lines.emplace_back();
+      continue;
+    }
+    const bool good = points_[i].status == PointStatus::good;
+    lines.push_back(line_of(points_[i], i + 1, point_count(plan_)) + (good ? green : yellow) +
+                    status_text(points_[i]) + plain);
+  }
+  return lines;
+}
+
+void Progress::draw() {
+  const std::vector<std::string> lines = picture();
+  // Without wrapping: a line that is too long is cut, not broken.
+  std::string frame = "\033[?7l";
+  if (drawn_lines_ > 0) frame += text("\033[%zuA", drawn_lines_);
+  for (const std::string& line : lines) frame += "\r" + line + "\033[K\n";
+  stream_ << frame << "\033[?7h" << std::flush;
+  drawn_lines_ = lines.size();
+}
+
+void Progress::close() {
+  if (drawn_lines_ > 0) stream_ << text("\033[%zuA\r\033[J", drawn_lines_) << std::flush;
+  drawn_lines_ = 0;
+}
+
+}  // namespace sinerig::report

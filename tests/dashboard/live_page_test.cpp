@@ -1,0 +1,154 @@
+// The live page in a real browser: it follows a run to its end, its Stop button stops it, nothing
+// complains. The run is in virtual time and goes on when the test says so.
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+
+#include <gtest/gtest.h>
+
+#include "dashboard/server.h"
+#include "support/browser.h"
+#include "support/served_run.h"
+
+namespace sinerig::dashboard {
+namespace {
+
+constexpr std::uint32_t points = 30;
+
+class RecordLog final : public RecordSink {
+ public:
+  void put(const Record& record) noexcept override { records.push_back(record); }
+  void put_sample(const TickSamples& samples) noexcept override { records.push_back(samples); }
+  bool flush() noexcept override { return true; }
+  std::vector<Record> records;
+};
+
+class LivePage : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto program = test::Browser::find();
+    if (!program) GTEST_SKIP() << "no Chromium here (Debian: apt install chromium)";
+    play();
+    server_ = std::make_unique<Server>(Server::Settings{.address = parse_address(":0"),
+                                                        .token = random_token(),
+                                                        .stop =
+                                                            [this] {
+                                                              ++stops_;
+                                                            }},
+                                       live_);
+    browser_ = std::make_unique<test::Browser>(*program);
+  }
+
+  // The whole run, its records kept to be told bit by bit.
+  void play() {
+    VirtualClock clock{TickGrid{plan_.rate_hz}};
+    sim::SimulatedRig rig{test::served_rig(), clock};
+    Sensor* const sensors[] = {&rig.sensor(0)};
+    Guard guard{test::served_limits(), clock.grid().period_s()};
+    RunnerSettings settings;
+    settings.record_samples = true;
+    SweepRunner{plan_, settings, clock, rig.actuator(), sensors, guard, log_}.run(control_);
+  }
+
+  // Tells the page everything up to the point of dwell `dwell`.
+  void tell_until(std::uint32_t dwell) {
+    for (; told_ < log_.records.size(); ++told_) {
+      const auto* point = std::get_if<Point>(&log_.records[told_]);
+      if (point != nullptr && point->dwell == dwell) return;
+      live_.take(log_.records[told_]);
+    }
+  }
+  void tell_all() {
+    for (; told_ < log_.records.size(); ++told_) live_.take(log_.records[told_]);
+  }
+
+  void keep_picture(const std::string& save) {
+    const char* folder = std::getenv("SINERIG_SCREENSHOTS");
+    if (folder == nullptr) return;
+    std::ofstream{std::string{folder} + "/" + save + ".png", std::ios::binary}
+        << browser_->screenshot();
+  }
+  void expect_no_errors() { EXPECT_TRUE(browser_->errors().empty()) << browser_->errors().front(); }
+
+  SweepPlan plan_ = test::served_plan(points);
+  Lateness lateness_;
+  RunControl control_;
+  RecordLog log_;
+  std::size_t told_ = 0;
+  std::atomic<int> stops_{0};
+  LiveRun live_{test::served_setup(plan_), lateness_};
+  std::unique_ptr<Server> server_;
+  std::unique_ptr<test::Browser> browser_;
+};
+
+TEST_F(LivePage, FollowsARunToItsEnd) {
+  lateness_.last_ns = 43'000;
+  lateness_.max_ns = 210'000;
+  browser_->open(server_->url(), 1440, 1000);
+  EXPECT_TRUE(browser_->wait_until("!!document.querySelector('#gain svg')"));
+  tell_until(12);
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('where').textContent.startsWith('13 of 30')"));
+  EXPECT_TRUE(browser_->wait_until("!!document.querySelector('#gain [data-status=now]')"));
+  EXPECT_TRUE(browser_->wait_until("!!document.querySelector('#lissajous .curve')"));
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('#signal .curve').length === 3"));
+  EXPECT_TRUE(browser_->wait_until("document.getElementById('late').textContent === '43.0 µs'"));
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#guard tr').length"), 3);
+  EXPECT_TRUE(
+      browser_->wait_until("document.querySelector('#estimate').textContent.includes('±')"));
+  EXPECT_TRUE(
+      browser_->wait_until("document.querySelectorAll('.points tbody tr').length === 12"));
+  keep_picture("live");
+  browser_->prefer_dark(true);
+  keep_picture("live-dark");
+  browser_->prefer_dark(false);
+
+  tell_all();
+  live_.finish({.outcome = "done", .detail = "", .files = {"axis.sweep", "axis.html"}});
+  EXPECT_TRUE(browser_->wait_until("document.getElementById('chip').textContent === 'done'"));
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('.points tbody tr').length"), points);
+  EXPECT_TRUE(browser_->evaluate("document.getElementById('stop').hidden").get<bool>());
+  EXPECT_NE(browser_->evaluate("document.getElementById('where').textContent")
+                .get<std::string>()
+                .find("wrote axis.sweep and axis.html"),
+            std::string::npos);
+  keep_picture("live-done");
+  // The program may go: the page keeps what it has and asks no more.
+  server_.reset();
+  browser_->evaluate("document.querySelector('[data-switch=hz]:not([aria-pressed=true])').click()");
+  EXPECT_FALSE(
+      browser_->evaluate("document.getElementById('main').innerHTML.includes('NaN')").get<bool>());
+  expect_no_errors();
+}
+
+TEST_F(LivePage, StopButtonStopsWithTheToken) {
+  browser_->open(server_->url(), 900, 700);
+  EXPECT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  EXPECT_EQ(browser_->evaluate("location.hash"), "") << "the token stays in the address bar";
+  browser_->evaluate("document.getElementById('stop').click()");
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('stop').textContent.startsWith('Stopping')"));
+  browser_->evaluate("document.getElementById('stop').click()");
+  EXPECT_TRUE(
+      browser_->wait_until("performance.getEntriesByType('resource').filter(e => "
+                           "e.name.endsWith('/stop')).length === 2"));
+  EXPECT_EQ(stops_.load(), 2);
+  live_.finish({.outcome = "interrupted", .detail = "stop requested", .files = {"axis.sweep"}});
+  EXPECT_TRUE(browser_->wait_until(
+      "document.getElementById('chip').textContent === 'interrupted: stop requested'"));
+  expect_no_errors();
+}
+
+TEST_F(LivePage, WithoutATokenItOnlyWatches) {
+  browser_->open("http://" + server_->address().text() + "/", 390, 800);
+  EXPECT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  EXPECT_TRUE(browser_->evaluate("document.getElementById('stop').disabled").get<bool>());
+  tell_until(5);
+  EXPECT_TRUE(browser_->wait_until("!!document.querySelector('#gain [data-status=now]')"));
+  EXPECT_LE(browser_->evaluate("document.documentElement.scrollWidth").get<int>(), 390);
+  keep_picture("live-narrow");
+  expect_no_errors();
+}
+
+}  // namespace
+}  // namespace sinerig::dashboard

@@ -1,0 +1,93 @@
+#include "report/progress.h"
+
+#include <sstream>
+
+#include <gmock/gmock.h>
+
+#include "report/remaining_time.h"
+
+namespace sinerig::report {
+namespace {
+
+using testing::HasSubstr;
+
+SweepPlan plan_of(std::uint32_t points) {
+  SweepSettings sweep;
+  sweep.start_hz = 1.0;
+  sweep.stop_hz = 100.0;
+  sweep.points = points;
+  sweep.amplitude = 1.0;
+  return plan_sweep(sweep, {}, 1000.0);
+}
+
+Point point_of(std::uint32_t dwell, PointStatus status = PointStatus::good) {
+  Point point{.dwell = dwell};
+  point.frequency_hz = 1.0 + dwell;
+  point.response = {0.0, -2.0};
+  point.gain_interval_db = 0.02;
+  point.phase_interval_deg = 0.3;
+  point.status = status;
+  return point;
+}
+
+TEST(Progress, IsALinePerPointInAPipe) {
+  std::ostringstream stream;
+  Progress progress{stream, Progress::Style::lines, plan_of(20), 200};
+  Point third = point_of(2);
+  third.pair = 1;
+  progress.point(point_of(1));
+  progress.point(third);
+  progress.update(3, 4000);
+  progress.close();
+  EXPECT_EQ(stream.str(), "   1/20     2.0000 Hz      6.021 dB ±0.02       -90.00° ±0.3      good\n");
+}
+
+TEST(Progress, DrawsAPictureAndTakesItAway) {
+  std::ostringstream stream;
+  Progress progress{stream, Progress::Style::live, plan_of(20), 100};
+  for (std::uint32_t i = 0; i < 8; ++i) progress.point(point_of(i));
+  progress.point(point_of(8, PointStatus::unsettled));
+  progress.update(9, 12345);
+  const std::string picture = stream.str();
+  EXPECT_THAT(picture, HasSubstr("10/20"));
+  EXPECT_THAT(picture, HasSubstr("0:12 elapsed"));
+  EXPECT_THAT(picture, HasSubstr("1 not good"));
+  EXPECT_THAT(picture, HasSubstr("unsettled"));
+  EXPECT_THAT(picture, HasSubstr("100 Hz"));
+  const auto lines = std::count(picture.begin(), picture.end(), '\n');
+  progress.close();
+  EXPECT_THAT(stream.str(), testing::EndsWith("\033[" + std::to_string(lines) + "A\r\033[J"));
+}
+
+TEST(Progress, SaysNothingWhenToldSo) {
+  std::ostringstream stream;
+  Progress progress{stream, Progress::Style::none, plan_of(20), 100};
+  progress.point(point_of(0));
+  progress.update(1, 1000);
+  progress.close();
+  EXPECT_EQ(stream.str(), "");
+}
+
+TEST(RemainingTime, LearnsFromWhatDwellsTook) {
+  const SweepPlan plan = plan_of(10);
+  RemainingTime time{plan};
+  EXPECT_DOUBLE_EQ(time.remaining_s(), plan.min_seconds());
+  // Each dwell takes twice its least.
+  std::uint64_t tick = 0;
+  for (std::uint32_t dwell = 0; dwell < 5; ++dwell) {
+    time.update(dwell, tick);
+    tick += 2 * plan.dwells[dwell].min_samples();
+  }
+  time.update(5, tick);
+  double left_s = 0.0;
+  for (std::uint32_t dwell = 5; dwell < 10; ++dwell)
+    left_s += 2.0 * static_cast<double>(plan.dwells[dwell].min_samples()) / plan.rate_hz;
+  EXPECT_NEAR(time.remaining_s(), left_s, 1e-9);
+  EXPECT_NEAR(time.elapsed_s() + time.remaining_s(), 2.0 * plan.min_seconds(), 1e-9);
+  time.update(10, tick);
+  EXPECT_EQ(time.remaining_s(), 0.0);
+  EXPECT_EQ(time.done(), 1.0);
+}
+
+}  // namespace
+}  // namespace sinerig::report
