@@ -69,6 +69,34 @@ std::string bench_time_text(const SweepPlan& plan) {
          text(" (%.1f to %.1f s)", plan.min_seconds(), plan.max_seconds());
 }
 
+namespace {
+
+// The sweeps that the plan consists of, where there are several.
+std::string sub_bands_text(const SweepPlan& plan) {
+  std::string lines;
+  for (std::size_t first = 0; first < plan.dwells.size();) {
+    std::size_t end = first;
+    double low_hz = unlimited;
+    double high_hz = 0.0;
+    SweepPlan part{.rate_hz = plan.rate_hz, .dwells = {}};
+    for (; end < plan.dwells.size() && plan.dwells[end].sub_band == plan.dwells[first].sub_band;
+         ++end) {
+      const double hz = plan.dwells[end].frequency_hz(plan.rate_hz);
+      low_hz = std::min(low_hz, hz);
+      high_hz = std::max(high_hz, hz);
+      part.dwells.push_back(plan.dwells[end]);
+    }
+    lines += text("sub-band %u: points %zu to %zu, %.6g to %.6g Hz, %s\n",
+                  plan.dwells[first].sub_band + 1, first + 1, end, low_hz, high_hz,
+                  bench_time_text(part).c_str());
+    first = end;
+  }
+  const bool several = !plan.dwells.empty() && plan.dwells.back().sub_band > 0;
+  return several ? lines : "";
+}
+
+}  // namespace
+
 void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings& sweep,
                 const std::string& unit) {
   stream << text("amplitude in %s, velocity in %s/s, acceleration in %s/s²\n", unit.c_str(),
@@ -89,6 +117,7 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
         seconds_of(dwell.min_samples(), plan.rate_hz), seconds_of(dwell.max_samples, plan.rate_hz));
   }
   stream << break_points(sweep);
+  stream << sub_bands_text(plan);
   const std::size_t asked = asked_frequencies(sweep).size();
   if (asked > plan.dwells.size()) {
     stream << asked - plan.dwells.size() << " of " << asked
