@@ -200,39 +200,6 @@ void check_ramp(const Dwell& dwell, double amplitude_before, const MotionLimits&
                         "; lengthen the ramp, lower the amplitude there or raise the limit");
 }
 
-double between(Spacing spacing, double start_hz, double stop_hz, double position) {
-  return spacing == Spacing::linear ? start_hz + (stop_hz - start_hz) * position
-                                    : start_hz * std::pow(stop_hz / start_hz, position);
-}
-
-struct Asked {
-  double hz;
-  std::uint32_t sub_band;
-};
-
-std::vector<Asked> all_asked(const SweepSettings& sweep) {
-  std::vector<Asked> asked;
-  if (sweep.spacing == Spacing::list) {
-    for (const double hz : sweep.frequencies_hz) asked.push_back({hz, 0});
-    return asked;
-  }
-  std::vector<SubBand> bands = sweep.sub_bands;
-  if (bands.empty()) bands = {{sweep.start_hz, sweep.stop_hz, sweep.points}};
-  for (std::uint32_t k = 0; k < bands.size(); ++k) {
-    const SubBand& band = bands[k];
-    for (std::uint32_t i = 0; i < band.points; ++i) {
-      const double position = band.points == 1 ? 0.0 : static_cast<double>(i) / (band.points - 1);
-      // The ends are what was asked for, not what pow() makes of them.
-      const bool last = i > 0 && i + 1 == band.points;
-      const double hz =
-          last ? band.stop_hz : between(sweep.spacing, band.start_hz, band.stop_hz, position);
-      if (i == 0 && !asked.empty() && asked.back().hz == hz) continue;
-      asked.push_back({hz, k});
-    }
-  }
-  return asked;
-}
-
 bool same_frequency(const Dwell& a, const Dwell& b) {
   return a.tones.front().cycles * b.block_samples == b.tones.front().cycles * a.block_samples;
 }
@@ -251,25 +218,6 @@ std::uint64_t SweepPlan::max_samples() const {
   return sum;
 }
 
-std::vector<SubBand> equal_sub_bands(const SweepSettings& sweep, std::uint32_t count) {
-  std::vector<SubBand> bands;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const double high = static_cast<double>(i + 1) / count;
-    bands.push_back({.start_hz = i == 0 ? sweep.start_hz : bands.back().stop_hz,
-                     .stop_hz = i + 1 == count
-                                    ? sweep.stop_hz
-                                    : between(sweep.spacing, sweep.start_hz, sweep.stop_hz, high),
-                     .points = sweep.points});
-  }
-  return bands;
-}
-
-std::vector<double> asked_frequencies(const SweepSettings& sweep) {
-  std::vector<double> frequencies_hz;
-  for (const Asked& asked : all_asked(sweep)) frequencies_hz.push_back(asked.hz);
-  return frequencies_hz;
-}
-
 double amplitude_at(const SweepSettings& sweep, double frequency_hz) {
   const double omega_rad_s = two_pi * frequency_hz;
   const double wanted = sweep.amplitude_table.empty()
@@ -280,7 +228,7 @@ double amplitude_at(const SweepSettings& sweep, double frequency_hz) {
 }
 
 SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, double rate_hz) {
-  const std::vector<Asked> asked = all_asked(sweep);
+  const std::vector<AskedFrequency> asked = asked_of(sweep);
   if (asked.empty()) {
     throw PlanRefused("sweep", "points", "no frequency to measure: give at least one");
   }
@@ -295,7 +243,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,
                     .max_distortion = sweep.max_distortion};
-  for (const Asked& each : asked) {
+  for (const AskedFrequency& each : asked) {
     const Dwell* before = plan.dwells.empty() ? nullptr : &plan.dwells.back();
     Dwell dwell = make_dwell(each.hz, sweep, rate_hz, before);
     dwell.sub_band = each.sub_band;
