@@ -67,9 +67,10 @@ CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
                   "delay of the measuring path in seconds, not part of the model");
   fit->add_option("--static-gain", options.static_gain, "ml: known gain of s^origin G(s) at s = 0");
   fit->add_option("--given-pole", options.given_poles_rad_s, "a known real pole in rad/s");
-  fit->add_option("--model-error", options.model_error,
-                  "relative error of the model itself, added to the scatter (default: 0 for CSV; for "
-                  "sweep files the least of 0.0001 to 0.002 that explains the residual)");
+  fit->add_option(
+      "--model-error", options.model_error,
+      "relative error of the model itself, added to the scatter (default: 0 for CSV; for "
+      "sweep files the least of 0.0001 to 0.002 that explains the residual)");
   fit->add_option("--weights", options.weights.weights,
                   "hassul: none, 1/w, column (the CSV's column \"weight\"), W1,W2,... one per "
                   "point, or a file of one number per line")

@@ -103,8 +103,7 @@ class Reader {
           "the header has no column freq_hz (frequency in Hz) and none omega_rad_s (in rad/s); "
           "name it by its unit");
     const bool cartesian = has("re") && has("im");
-    const bool polar =
-        (has("gain_db") || has("gain")) && (has("phase_deg") || has("phase_rad"));
+    const bool polar = (has("gain_db") || has("gain")) && (has("phase_deg") || has("phase_rad"));
     if (!cartesian && !polar)
       lines_.refuse(std::string{"the header has no column "} + (has("re") ? "im" : "re") +
                     "; wanted re and im, or gain_db (or gain) and phase_deg (or phase_rad), and "
@@ -133,8 +132,7 @@ class Reader {
 
   std::complex<double> measured() const {
     if (has("re") && has("im")) return {number("re"), number("im")};
-    const double gain =
-        has("gain_db") ? std::pow(10.0, number("gain_db") / 20.0) : number("gain");
+    const double gain = has("gain_db") ? std::pow(10.0, number("gain_db") / 20.0) : number("gain");
     const double phase =
         has("phase_deg") ? number("phase_deg") * (turn / 360.0) : number("phase_rad");
     return {gain * std::cos(phase), gain * std::sin(phase)};

@@ -204,8 +204,7 @@ void fit_by_paper(const FitCommandOptions& options, const Measured& measured,
     weights = weights_of(options.weights, column, response);
     model = identify::fit_hassul(response, orders, weights);
   }
-  report.fit =
-      identify::describe_least_squares(measured.response, fit, orders, model, weights);
+  report.fit = identify::describe_least_squares(measured.response, fit, orders, model, weights);
 }
 
 void add_discrete(const FitCommandOptions& options, const Measured& measured,

@@ -35,8 +35,7 @@ std::vector<double> of_function(const WeightOptions& options, const Response& re
     throw std::invalid_argument("--weights and --weight-num are two weights; give one");
   if (options.num.empty() || options.den.empty())
     throw std::invalid_argument("--weight-num and --weight-den belong together: W_a(s) = num/den");
-  std::vector<double> weights =
-      identify::weights_from({options.num, options.den, 0.0}, response);
+  std::vector<double> weights = identify::weights_from({options.num, options.den, 0.0}, response);
   const auto unusable = [](double weight) {
     return !std::isfinite(weight) || weight <= 0.0;
   };

@@ -50,8 +50,8 @@ void read_json(const Json& json, PlantModel& model) {
   model.root_covariance.covariance.resize(size, size);
   for (Eigen::Index i = 0; i < size; ++i)
     for (Eigen::Index k = 0; k < size; ++k)
-      model.root_covariance.covariance(i, k) = number_or_zero(
-          rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(k)));
+      model.root_covariance.covariance(i, k) =
+          number_or_zero(rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(k)));
   if (size != identify::coordinates_of(model.zpk))
     throw InputError("the covariance does not belong to the roots");
 }
@@ -61,8 +61,7 @@ std::string fitted(const std::string& file, const std::string& channel) {
   options.files = {file};
   options.channel = channel;
   const report::FitReport report = fit_files(options);
-  if (!report.fit.converged)
-    spdlog::warn("the fit has not converged: {}", report.fit.reason);
+  if (!report.fit.converged) spdlog::warn("the fit has not converged: {}", report.fit.reason);
   return report::fit_json(report);
 }
 
@@ -89,8 +88,7 @@ PlantModel read_plant_model(const std::string& file, const std::string& channel,
 
 identify::Curve::Scatter PlantModel::scatter() const {
   return [zpk = zpk, covariance = root_covariance](double omega_rad_s) {
-    return identify::log_scatter(
-        identify::response_with_covariance(zpk, covariance, omega_rad_s));
+    return identify::log_scatter(identify::response_with_covariance(zpk, covariance, omega_rad_s));
   };
 }
 

@@ -14,7 +14,7 @@ namespace sinerig::cli {
 struct PlantModel {
   FitInput measured;
   identify::ZerosPolesGain zpk;
-  std::vector<identify::Mode> modes;  // frequency, damping and pole only
+  std::vector<identify::Mode> modes;         // frequency, damping and pole only
   identify::RootCovariance root_covariance;  // of zpk
 
   // Relative scatter of G at any frequency.

@@ -45,8 +45,8 @@ struct StoredFit {
   // Of poles, zeros, gain and delay in the coordinates of identify::RootCovariance; empty where the
   // file does not hold it.
   double reference_hz = 0.0;
-  std::vector<std::vector<double>> root_covariance;
-  std::optional<StoredChoe> choe;
+  std::vector<std::vector<double>> root_covariance{};
+  std::optional<StoredChoe> choe{};
   std::vector<std::pair<std::string, std::string>> facts;  // all that is a single value
 };
 

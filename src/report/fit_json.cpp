@@ -105,8 +105,7 @@ Json state_space_json(const Fit& fit) {
   const auto numbers = [](const ZerosPolesGain& model) {
     return numbers_of(identify::to_modal_form(model));
   };
-  const std::size_t order =
-      static_cast<std::size_t>(identify::to_modal_form(fit.zpk).A.rows());
+  const std::size_t order = static_cast<std::size_t>(identify::to_modal_form(fit.zpk).A.rows());
   Json json = system_json(numbers(fit.zpk), order);
   json["delay_s"] = fit.zpk.delay_s;
   json["standard_error"] =
@@ -169,8 +168,9 @@ Json choe_json(const identify::ChoeFit& choe) {
     models.push_back({{"num", model.num}, {"den", model.den}});
   Json nominal = Json::array();
   for (const auto value : choe.nominal) nominal.push_back(pair_json(value));
-  return {{"freq_hz", frequencies}, {"bands", bands},          {"band_models", models},
-          {"nominal", nominal},     {"additive", choe.additive}, {"weight", choe.weight}};
+  return {{"freq_hz", frequencies},    {"bands", bands},
+          {"band_models", models},     {"nominal", nominal},
+          {"additive", choe.additive}, {"weight", choe.weight}};
 }
 
 void add_forms(Json& json, const FitReport& report) {

@@ -90,8 +90,8 @@ void print_discrete(std::ostream& stream, const FitReport& report) {
   if (report.discrete->prewarp_rad_s > 0.0)
     stream << format(", exact at %.6g Hz", report.discrete->prewarp_rad_s / turn);
   stream << format(", %d ticks of delay beside\n  ", model.delay_ticks)
-         << polynomial_text(model.num(), "z") << "\n  over\n  "
-         << polynomial_text(model.den(), "z") << '\n';
+         << polynomial_text(model.num(), "z") << "\n  over\n  " << polynomial_text(model.den(), "z")
+         << '\n';
 }
 
 }  // namespace
@@ -109,8 +109,8 @@ void print_fit(std::ostream& stream, const FitReport& report) {
          << "\n\n  " << polynomial_text(model.num, "s") << "\n  over\n  "
          << polynomial_text(model.den, "s") << "\n";
   if (model.delay_s != 0.0) stream << format("  times exp(-%.7g s)\n", model.delay_s);
-  stream << "\n+- num       " << errors_text(report.fit.num_standard_error)
-         << "\n+- den       " << errors_text(report.fit.den_standard_error) << '\n';
+  stream << "\n+- num       " << errors_text(report.fit.num_standard_error) << "\n+- den       "
+         << errors_text(report.fit.den_standard_error) << '\n';
   print_quality(stream, report.fit);
   for (const std::size_t i : report.fit.outliers)
     stream << format("outlier left out: %.6g Hz\n", report.response[i].omega_rad_s / turn);

@@ -25,8 +25,8 @@ struct FitReport {
   std::string label;
   std::string method;           // ml hassul choe
   identify::Response response;  // as measured
-  double hold_period_s = 0.0;  // of the hold in front of the plant when it was measured, 0: none
-  double path_delay_s = 0.0;   // of the measuring path, divided out before the fit
+  double hold_period_s = 0.0;   // of the hold in front of the plant when it was measured, 0: none
+  double path_delay_s = 0.0;    // of the measuring path, divided out before the fit
   identify::Fit fit;
   std::optional<identify::ChoeFit> choe;
   std::optional<DiscreteEquivalent> discrete;

@@ -69,8 +69,8 @@ ModelBand model_band(const record::StoredFit& fit, const std::vector<double>& fr
   }
   ModelBand band;
   for (const double hz : frequency_hz) {
-    const identify::LogScatter scatter = identify::log_scatter(
-        identify::response_with_covariance(model, covariance, turn * hz));
+    const identify::LogScatter scatter =
+        identify::log_scatter(identify::response_with_covariance(model, covariance, turn * hz));
     band.gain.push_back(z95 * std::sqrt(scatter.gain));
     band.phase_rad.push_back(z95 * std::sqrt(scatter.phase));
   }

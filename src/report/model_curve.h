@@ -14,8 +14,8 @@ namespace sinerig::report {
 std::vector<std::complex<double>> model_response(const record::StoredFit& fit,
                                                  const std::vector<double>& frequency_hz);
 
-// Relative half widths of the 95 % intervals of the model's gain (of the amplitude) and phase (rad),
-// one each per frequency; empty where the file holds no covariance of the model.
+// Relative half widths of the 95 % intervals of the model's gain (of the amplitude) and phase
+// (rad), one each per frequency; empty where the file holds no covariance of the model.
 struct ModelBand {
   std::vector<double> gain;
   std::vector<double> phase_rad;
