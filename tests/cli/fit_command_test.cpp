@@ -177,8 +177,9 @@ TEST_F(FitCommand, TakesWeightsFromAListAFileAColumnOrAFunction) {
                   weight);
     csv += line;
     std::snprintf(line, sizeof line, "%.17g", weight);
-    list += (list.empty() ? "" : ",") + std::string{line};
-    file += std::string{line} + "\n";
+    if (!list.empty()) list.append(",");
+    list.append(line);
+    file.append(line).append("\n");
   }
   workshop_.write("weights.txt", file);
   const auto pole = [&](const std::string& weights) {
@@ -198,7 +199,7 @@ TEST_F(FitCommand, TakesWeightsFromAListAFileAColumnOrAFunction) {
 }
 
 TEST_F(FitCommand, GivesSectionsStateSpaceAndDiscreteFormsWithErrors) {
-  const auto run = fit(lag_csv(), "--zeros 0 --poles 1 --json --discrete zoh --rate 1000");
+  const auto run = fit(lag_csv(), "--zeros 0 --poles 1 --json --discrete zoh --rate 800");
   ASSERT_EQ(run.exit_code, 0) << run.errors;
   const json model = json::parse(run.output);
   EXPECT_NEAR(model["sections"][0]["den"][2].get<double>(), 100.0, 1e-6);
@@ -206,12 +207,12 @@ TEST_F(FitCommand, GivesSectionsStateSpaceAndDiscreteFormsWithErrors) {
               model["den_standard_error"][1].get<double>(), 1e-5);
   EXPECT_NEAR(model["state_space"]["A"][0][0].get<double>(), -100.0, 1e-6);
   EXPECT_GT(model["state_space"]["standard_error"]["B"][0].get<double>(), 0.0);
-  // 3·(1 − e^−0.1)/(z − e^−0.1), and two ticks of delay.
+  // The pole e^−0.125; the delay of 1.6 ticks adds one at 0.
   const json& discrete = model["discrete"];
-  EXPECT_NEAR(discrete["den"][1].get<double>(), -std::exp(-0.1), 1e-7);
-  const double period_s = 1e-3;
+  EXPECT_NEAR(discrete["den"][1].get<double>(), -std::exp(-0.125), 1e-7);
+  const double period_s = 1.0 / 800.0;
   EXPECT_NEAR(discrete["den_standard_error"][1].get<double>(),
-              period_s * std::exp(-0.1) * model["den_standard_error"][1].get<double>(), 1e-7);
+              period_s * std::exp(-0.125) * model["den_standard_error"][1].get<double>(), 1e-7);
   refuses(lag_csv(), "--discrete needs the rate", "--zeros 0 --poles 1 --discrete tustin");
 }
 

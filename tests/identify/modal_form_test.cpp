@@ -24,7 +24,7 @@ TEST(ModalForm, HasTheResponseOfTheModel) {
   EXPECT_LT(largest_error(gimbal_b(), gimbal_grid()), 1e-10);
   EXPECT_LT(largest_error(wide_plant(13, random), wide_grid()), 1e-8);
   for (int run = 0; run < 50; ++run)
-    EXPECT_LT(largest_error(RandomGimbal<std::mt19937_64>(random).plant, gimbal_grid()), 1e-9);
+    EXPECT_LT(largest_error(RandomGimbal<std::mt19937_64>(random).plant, gimbal_grid()), 1e-8);
 }
 
 TEST(ModalForm, TakesEqualOrdersPolesAtTheOriginAndZerosThere) {
@@ -39,8 +39,11 @@ TEST(ModalForm, IsBlockDiagonalWithEvenlySharedGains) {
   const StateSpace system = to_modal_form(gimbal_b());
   ASSERT_EQ(system.A.rows(), 7);
   for (Eigen::Index i = 0; i < 7; ++i)
-    for (Eigen::Index k = 0; k < 7; ++k)
-      if (std::abs(i - k) > 1) EXPECT_EQ(system.A(i, k), 0.0);
+    for (Eigen::Index k = 0; k < 7; ++k) {
+      if (std::abs(i - k) > 1) {
+        EXPECT_EQ(system.A(i, k), 0.0);
+      }
+    }
   const double omega = 2.0 * std::numbers::pi * 23.0;
   EXPECT_NEAR(system.A(2, 2), -0.01 * omega, 1e-9 * omega);
   EXPECT_NEAR(system.B.segment(2, 2).norm(), system.C.segment(2, 2).norm(), 1e-12);
