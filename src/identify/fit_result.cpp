@@ -37,6 +37,7 @@ struct Inverse {
 
 Inverse invert(const MatrixXd& J) {
   const Index parameters = J.cols();
+  if (parameters == 0) return {MatrixXd(0, 0), 1.0};  // everything given
   const VectorXd size = J.colwise().norm().cwiseMax(1e-300);
   const MatrixXd scaled = J * size.cwiseInverse().asDiagonal();
   MatrixXd R = scaled.householderQr().matrixQR().topRows(parameters).triangularView<Eigen::Upper>();
