@@ -13,6 +13,8 @@ namespace {
 // resolution of the reversal, not stability.
 constexpr double friction_substeps = 16.0;
 
+constexpr std::size_t rows_at_a_time = 4;
+
 constexpr std::size_t max_known_transitions = 32;
 
 // Edges of the input that can be under way at once beside those of the dead time.
@@ -53,15 +55,16 @@ Plant::Plant(const LinearSystem& system, double period_s, Friction friction)
       input_gain_{system.input_gain},
       friction_{friction},
       norm_{n_ == 0 ? 0.0 : (system.a * period_s).cwiseAbs().rowwise().sum().maxCoeff()},
-      state_(n_),
-      scratch_(n_),
+      rows_{(n_ + rows_at_a_time - 1) / rows_at_a_time * rows_at_a_time},
+      state_(rows_),
+      scratch_(rows_),
       term_(n_),
       product_(n_),
-      before_(n_),
+      before_(rows_),
       edges_(static_cast<std::size_t>(std::ceil(dead_ticks_)) + spare_edges),
       known_(
           max_known_transitions,
-          {.ticks = 0.0, .phi = std::vector<double>(n_ * n_), .gamma = std::vector<double>(n_)}) {
+          {.ticks = 0.0, .phi = std::vector<double>(n_ * rows_), .gamma = std::vector<double>(rows_)}) {
   // Dead times that are whole ticks but for the rounding of the division are whole ticks.
   if (std::abs(dead_ticks_ - std::round(dead_ticks_)) < 1e-9) dead_ticks_ = std::round(dead_ticks_);
   if (friction_.present() && velocity_.empty()) {
@@ -117,8 +120,16 @@ void Plant::step(double ticks) noexcept {
     integrate(state_, input_, ticks);
     return;
   }
-  for (std::size_t i = 0; i < n_; ++i) {
-    scratch_[i] = dot(known->phi.data() + i * n_, state_.data(), n_) + known->gamma[i] * input_;
+  // Rows at a time, whose sums don't wait for each other.
+  for (std::size_t i = 0; i < rows_; i += rows_at_a_time) {
+    double sums[rows_at_a_time] = {};
+    for (std::size_t j = 0; j < n_; ++j) {
+      const double* column = known->phi.data() + j * rows_ + i;
+      for (std::size_t k = 0; k < rows_at_a_time; ++k) sums[k] += column[k] * state_[j];
+    }
+    for (std::size_t k = 0; k < rows_at_a_time; ++k) {
+      scratch_[i + k] = sums[k] + known->gamma[i + k] * input_;
+    }
   }
   state_.swap(scratch_);
 }
@@ -170,9 +181,7 @@ void Plant::learn(Transition& slot, double ticks) noexcept {
     std::fill(scratch_.begin(), scratch_.end(), 0.0);
     if (j < n_) scratch_[j] = 1.0;
     integrate(scratch_, j < n_ ? 0.0 : 1.0, ticks);
-    for (std::size_t i = 0; i < n_; ++i) {
-      (j < n_ ? slot.phi[i * n_ + j] : slot.gamma[i]) = scratch_[i];
-    }
+    std::copy_n(scratch_.begin(), n_, j < n_ ? &slot.phi[j * rows_] : slot.gamma.data());
   }
 }
 

@@ -62,8 +62,8 @@ class Plant {
   };
   struct Transition {
     double ticks = 0.0;
-    std::vector<double> phi;    // n×n, row-major
-    std::vector<double> gamma;  // n
+    std::vector<double> phi;    // n columns of rows_, zeros below
+    std::vector<double> gamma;  // rows_
   };
 
   std::size_t wrapped(std::size_t index) const noexcept {
@@ -92,6 +92,7 @@ class Plant {
   Friction friction_;
   double norm_;  // of A per tick, with b
 
+  std::size_t rows_;  // n_ rounded up
   std::vector<double> state_;
   std::vector<double> scratch_;
   std::vector<double> term_;

@@ -9,6 +9,7 @@ namespace sinerig::sim {
 namespace {
 
 PlantTime plant_time(Instant instant, double period_ns) noexcept {
+  if (instant.offset_ns == 0) return {.tick = instant.tick, .fraction = 0.0};
   const double fraction = static_cast<double>(instant.offset_ns) / period_ns;
   return PlantTime{.tick = instant.tick, .fraction = 0.0}.plus(fraction);
 }
@@ -22,14 +23,17 @@ class SimulatedRig::Core {
 
   // The command becomes the input of the plant, or of the loop around it. A controller reads before
   // it writes: its plant has no direct feedthrough, so sampling first changes nothing.
-  void apply(double command) noexcept {
-    const PlantTime now = plant_time(clock_.now(), period_ns_);
+  // Returns the time, ns.
+  std::int64_t apply(double command) noexcept {
+    const Instant present = clock_.now();
+    const PlantTime now = plant_time(present, period_ns_);
+    const std::int64_t now_ns = clock_.time_ns(present);
     if (!controller_) {
       plant_.apply(command, now);
-      refresh();
-      return;
+      refresh(now, now_ns);
+      return now_ns;
     }
-    refresh();
+    refresh(now, now_ns);
     plant_.sample(now, outputs_);
     plant_.apply(controller_->step(command, outputs_[feedback_]).plant_input, now);
     for (Channel& channel : channels_) {
@@ -37,12 +41,12 @@ class SimulatedRig::Core {
         channel.history[channel.newest].value = loop_signal(channel.signal);
       }
     }
+    return now_ns;
   }
 
   // The sample of a sensor's output; a second read without a command in between samples again.
   Sample take(std::size_t sensor) noexcept;
 
-  const Clock& clock() const noexcept { return clock_; }
   double period_s() const noexcept { return period_ns_ * 1e-9; }
 
  private:
@@ -60,7 +64,7 @@ class SimulatedRig::Core {
     std::size_t oldest() const noexcept { return newest + 1 == history.size() ? 0 : newest + 1; }
   };
 
-  void refresh() noexcept;
+  void refresh(PlantTime now, std::int64_t now_ns) noexcept;
   double loop_signal(Signal signal) const noexcept;
   void sample(Channel& channel, std::int64_t now_ns, PlantTime now) noexcept;
 
@@ -109,10 +113,7 @@ SimulatedRig::Core::Core(const SimulatedRigSettings& settings, const Clock& cloc
 }
 
 // Sensors are sampled in the order of their instants, so that the plant only ever moves forward.
-void SimulatedRig::Core::refresh() noexcept {
-  const Instant present = clock_.now();
-  const PlantTime now = plant_time(present, period_ns_);
-  const std::int64_t now_ns = clock_.time_ns(present);
+void SimulatedRig::Core::refresh(PlantTime now, std::int64_t now_ns) noexcept {
   for (Channel& channel : channels_) {
     double back = channel.delay_ticks;
     if (channel.jitter_ticks > 0.0) {
@@ -148,7 +149,10 @@ double SimulatedRig::Core::loop_signal(Signal signal) const noexcept {
 
 Sample SimulatedRig::Core::take(std::size_t sensor) noexcept {
   Channel& channel = channels_[sensor];
-  if (channel.taken) refresh();
+  if (channel.taken) {
+    const Instant present = clock_.now();
+    refresh(plant_time(present, period_ns_), clock_.time_ns(present));
+  }
   channel.taken = true;
   return channel.history[channel.oldest()];
 }
@@ -175,10 +179,8 @@ class SimulatedRig::Drive final : public Actuator {
       position_ = std::clamp(slewed, settings_.min, settings_.max);
       held_ = std::clamp(quantise(position_, settings_.quantum), settings_.min, settings_.max);
     }
-    core_.apply(held_);
-    return {.value = held_,
-            .time_ns = core_.clock().time_ns(core_.clock().now()),
-            .fault = lost ? Fault::bus : Fault::none};
+    const std::int64_t now_ns = core_.apply(held_);
+    return {.value = held_, .time_ns = now_ns, .fault = lost ? Fault::bus : Fault::none};
   }
 
   void release() noexcept override {

@@ -31,11 +31,12 @@ bool is_sweep_file(const std::string& path) {
 std::vector<double> edges_between_sub_bands(const record::StoredRun& run) {
   std::map<std::uint32_t, std::pair<double, double>> reach;  // of each sub-band, Hz
   for (const Dwell& dwell : run.plan.dwells) {
-    if (dwell.tones.empty()) continue;
-    const double hz = dwell.frequency_hz(run.plan.rate_hz);
-    auto& [low, high] = reach.try_emplace(dwell.sub_band, hz, hz).first->second;
-    low = std::min(low, hz);
-    high = std::max(high, hz);
+    for (const Tone& tone : dwell.tones) {
+      const double hz = dwell.tone_hz(tone, run.plan.rate_hz);
+      auto& [low, high] = reach.try_emplace(dwell.sub_band, hz, hz).first->second;
+      low = std::min(low, hz);
+      high = std::max(high, hz);
+    }
   }
   std::vector<std::pair<double, double>> bands;
   for (const auto& [number, band] : reach) bands.push_back(band);

@@ -166,7 +166,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const config::Rig& rig = configured.rig();
   const SweepPlan plan = rig.plan();
   Clock& clock = configured.clock();
-  spdlog::info("{} points, {} of bench time", plan.dwells.size(), report::bench_time_text(plan));
+  spdlog::info("{}, {} of bench time", report::plan_size_text(plan), report::bench_time_text(plan));
 
   const std::string path =
       options.output.empty() ? default_output(options.rig, options.force) : options.output;

@@ -134,6 +134,11 @@ SweepSettings read_sweep(const Section& section, double rate_hz) {
   read_frequencies(section, rate_hz, sweep);
   sweep.frequency_tolerance =
       section.number("frequency_tolerance", {.min = 1e-9, .max = 0.1}, sweep.frequency_tolerance);
+  sweep.tones =
+      static_cast<std::uint32_t>(section.integer("tones", {.min = 1.0, .max = 16.0}, sweep.tones));
+  sweep.tones_tolerance =
+      section.number("tones_tolerance", {.min = 1e-6, .max = 0.2}, sweep.tones_tolerance);
+  sweep.odd_bins = section.flag("odd_bins", sweep.odd_bins);
   read_amplitude(section, sweep);
   sweep.level = read_level(section);
   sweep.offset = section.number("offset", any_number, sweep.offset);
@@ -275,6 +280,7 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   for (const Channel& sensor : rig.sensors) {
     rig.guard.channels.push_back(read_channel_limits(sensor.section));
   }
+  rig.runner.max_gap_s = loop.number("max_gap_s", {.min = 0.001, .max = 3600.0}, 1.0);
   if (const auto output = file->find("output")) {
     rig.runner.record_samples = output->flag("samples", false);
   }

@@ -53,12 +53,25 @@ std::string point_text(double frequency_hz, std::complex<double> response, const
               status, *reason == '\0' ? "" : ": ", reason);
 }
 
+std::string lengths(const Dwell& dwell, double rate_hz) {
+  return text(" %9.3f %7u %9.4f %10.3f %10.3f", seconds_of(dwell.settle_samples, rate_hz),
+              dwell.blocks, seconds_of(dwell.block_samples, rate_hz),
+              seconds_of(dwell.min_samples(), rate_hz), seconds_of(dwell.max_samples, rate_hz));
+}
+
 }  // namespace
 
 std::string duration_text(double seconds) {
   const auto whole = static_cast<long>(std::llround(seconds));
   if (whole < 3600) return text("%ld:%02ld", whole / 60, whole % 60);
   return text("%ld:%02ld:%02ld", whole / 3600, whole / 60 % 60, whole % 60);
+}
+
+std::string plan_size_text(const SweepPlan& plan) {
+  std::size_t points = 0;
+  for (const Dwell& dwell : plan.dwells) points += dwell.tones.size();
+  const std::string size = text("%zu points", points);
+  return points == plan.dwells.size() ? size : size + text(" in %zu dwells", plan.dwells.size());
 }
 
 std::string bench_time_text(const SweepPlan& plan) {
@@ -74,20 +87,25 @@ namespace {
 // The sweeps that the plan consists of, where there are several.
 std::string sub_bands_text(const SweepPlan& plan) {
   std::string lines;
+  std::size_t points = 0;
   for (std::size_t first = 0; first < plan.dwells.size();) {
     std::size_t end = first;
+    const std::size_t first_point = points + 1;
     double low_hz = unlimited;
     double high_hz = 0.0;
     SweepPlan part{.rate_hz = plan.rate_hz, .dwells = {}};
     for (; end < plan.dwells.size() && plan.dwells[end].sub_band == plan.dwells[first].sub_band;
          ++end) {
-      const double hz = plan.dwells[end].frequency_hz(plan.rate_hz);
-      low_hz = std::min(low_hz, hz);
-      high_hz = std::max(high_hz, hz);
-      part.dwells.push_back(plan.dwells[end]);
+      const Dwell& dwell = plan.dwells[end];
+      for (const Tone& tone : dwell.tones) {
+        low_hz = std::min(low_hz, dwell.tone_hz(tone, plan.rate_hz));
+        high_hz = std::max(high_hz, dwell.tone_hz(tone, plan.rate_hz));
+      }
+      points += dwell.tones.size();
+      part.dwells.push_back(dwell);
     }
     lines += text("sub-band %u: points %zu to %zu, %.6g to %.6g Hz, %s\n",
-                  plan.dwells[first].sub_band + 1, first + 1, end, low_hz, high_hz,
+                  plan.dwells[first].sub_band + 1, first_point, points, low_hz, high_hz,
                   bench_time_text(part).c_str());
     first = end;
   }
@@ -104,26 +122,28 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
   stream << text("%5s %12s %14s %11s %11s %12s %9s %7s %9s %10s %10s\n", "point", "asked Hz",
                  "exact Hz", "amplitude", "velocity", "acceleration", "settle s", "blocks",
                  "block s", "at least s", "at most s");
-  for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
-    const Dwell& dwell = plan.dwells[i];
-    const double frequency_hz = dwell.frequency_hz(plan.rate_hz);
-    const double omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
-    const double amplitude = dwell.tones.front().amplitude;
-    stream << text(
-        "%5zu %12.6g %14.9g %11.4g %11.4g %12.4g %9.3f %7u %9.4f %10.3f %10.3f\n", i + 1,
-        dwell.asked_hz, frequency_hz, amplitude, amplitude * omega_rad_s,
-        amplitude * omega_rad_s * omega_rad_s, seconds_of(dwell.settle_samples, plan.rate_hz),
-        dwell.blocks, seconds_of(dwell.block_samples, plan.rate_hz),
-        seconds_of(dwell.min_samples(), plan.rate_hz), seconds_of(dwell.max_samples, plan.rate_hz));
+  std::size_t points = 0;
+  for (const Dwell& dwell : plan.dwells) {
+    for (const Tone& tone : dwell.tones) {
+      const bool first = &tone == &dwell.tones.front();
+      const double frequency_hz = dwell.tone_hz(tone, plan.rate_hz);
+      const double omega_rad_s = 2.0 * std::numbers::pi * frequency_hz;
+      stream << text("%5zu %12s %14.9g %11.4g %11.4g %12.4g", ++points,
+                     first ? text("%.6g", dwell.asked_hz).c_str() : "with it", frequency_hz,
+                     tone.amplitude, tone.amplitude * omega_rad_s,
+                     tone.amplitude * omega_rad_s * omega_rad_s);
+      if (first) stream << lengths(dwell, plan.rate_hz);
+      stream << '\n';
+    }
   }
   stream << break_points(sweep);
   stream << sub_bands_text(plan);
   const std::size_t asked = asked_frequencies(sweep).size();
-  if (asked > plan.dwells.size()) {
-    stream << asked - plan.dwells.size() << " of " << asked
+  if (asked > points) {
+    stream << asked - points << " of " << asked
            << " points fell on a frequency already planned and were merged\n";
   }
-  stream << plan.dwells.size() << " points, " << bench_time_text(plan) << " of bench time\n";
+  stream << plan_size_text(plan) << ", " << bench_time_text(plan) << " of bench time\n";
 }
 
 namespace {

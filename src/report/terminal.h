@@ -20,6 +20,7 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
 void print_run(std::ostream& stream, const record::StoredRun& run);
 
 // "7:34 (454.5 s)", or the least and the most where the plan leaves it open.
+std::string plan_size_text(const SweepPlan& plan);  // "60 points in 15 dwells"
 std::string bench_time_text(const SweepPlan& plan);
 
 // 93784 s → "26:03:04", 12.3 s → "0:12".

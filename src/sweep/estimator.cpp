@@ -35,6 +35,8 @@ WindowEstimator::WindowEstimator(std::size_t max_bins)
     : input_{2 + 2 * max_bins},
       output_{2 + 2 * max_bins},
       cluster_{2 + 2 * max_bins},
+      stairs_{2 + 2 * max_bins},
+      drift_products_(2 + 2 * max_bins),
       plain_solver_{1 + 2 * max_bins},
       plain_gram_(triangle(1 + 2 * max_bins)),
       whole_{1 + 2 * max_bins},
@@ -50,14 +52,58 @@ double WindowEstimator::Solution::variance(std::size_t order) const noexcept {
   return residual_square / dof;
 }
 
+// The sums of a stretch of the window, `slope` times the drift taken out of the channel. With a
+// staircase the drift's row holds that one's products.
+void WindowEstimator::load(const Regression& regression, const Window& window, std::size_t first,
+                           std::size_t last, std::size_t channel, double slope,
+                           NormalSums& sums) noexcept {
+  regression.window(channel, first, last, sums);
+  if (window.block == 0) return;
+  regression.staircase(channel, first, last, window.first, window.block, stairs_);
+  constexpr std::size_t drift = Regression::drift_row;
+  const std::size_t order = regression.order();
+  const auto element = [&](std::size_t row) -> double& {
+    return row < drift ? sums.gram[triangle(drift) + row] : sums.gram[triangle(row) + drift];
+  };
+  sums.square += slope * (slope * element(drift) - 2.0 * sums.moments[drift]);
+  for (std::size_t row = 0; row < order; ++row) {
+    const bool is_drift = row == drift;
+    drift_products_[row] = is_drift ? stairs_.products[drift] : element(row);
+    const double moment = is_drift ? stairs_.moment : sums.moments[row];
+    sums.moments[row] = moment - slope * drift_products_[row];
+    element(row) = is_drift ? stairs_.square : stairs_.products[row];
+  }
+}
+
+// The slope of the drift, with the staircase as its instrument: the solution of Zᵀ(y − Xβ) = 0, Z
+// the regressors with the staircase in the place of the drift. Regressing on Z gives b = Tβ, T the
+// unit matrix but for the drift's column, which is the drift regressed on Z.
+void WindowEstimator::take_slope(Solution& solution, std::size_t order) noexcept {
+  constexpr std::size_t drift = Regression::drift_row;
+  const std::span through{solution.through_drift.data(), order};
+  std::copy_n(drift_products_.begin(), order, through.begin());
+  solution.solver.solve(through);
+  const double climb = through[drift];
+  solution.slope = climb > 0.0 ? solution.beta[drift] / climb : 0.0;
+  for (double& each : through) each = climb > 0.0 ? each / climb : 0.0;
+}
+
 bool WindowEstimator::solve(const Regression& regression, const Window& window, std::size_t channel,
                             Solution& solution) noexcept {
   const std::size_t order = regression.order();
-  regression.window(channel, window.first, window.last, solution.sums);
+  load(regression, window, window.first, window.last, channel, 0.0, solution.sums);
   if (solution.sums.count <= static_cast<double>(order)) return false;
   if (!solution.solver.factor(solution.sums.gram, order)) return false;
   std::copy_n(solution.sums.moments.begin(), order, solution.beta.begin());
   solution.solver.solve(std::span{solution.beta}.first(order));
+  solution.slope = solution.beta[Regression::drift_row];
+  std::fill_n(solution.through_drift.begin(), order, 0.0);
+  if (window.block > 0) {
+    take_slope(solution, order);
+    load(regression, window, window.first, window.last, channel, solution.slope, solution.sums);
+    std::copy_n(solution.sums.moments.begin(), order, solution.beta.begin());
+    solution.solver.solve(std::span{solution.beta}.first(order));
+  }
   double explained = 0.0;
   for (std::size_t i = 0; i < order; ++i) explained += solution.beta[i] * solution.sums.moments[i];
   solution.residual_square = std::max(0.0, solution.sums.square - explained);
@@ -84,16 +130,41 @@ bool WindowEstimator::estimate(const Regression& regression, const Window& windo
     take_coefficients(pair, order, tone, estimate);
     if (estimate.input == std::complex<double>{}) return false;
   }
-  const double noise = output_.variance(order);
-  double distortion = 0.0;
-  for (std::size_t bin = estimates.size(); bin < estimates.size() + harmonics; ++bin) {
-    // Three times its expectation is what noise alone exceeds in one bin of twenty.
-    const double floor = 3.0 * 4.0 * noise / output_.sums.count;
-    distortion += std::max(0.0, std::norm(phasor_of(output_.beta, bin)) - floor);
-  }
-  estimates[0].distortion = std::sqrt(distortion) / std::abs(estimates[0].output);
+  take_distortion(pair, order, estimates[0]);
   take_clusters(regression, window, pair, estimates);
   return true;
+}
+
+bool WindowEstimator::is_sinusoidal(const Regression& regression, const Window& window,
+                                    std::size_t channel, std::size_t tones,
+                                    std::size_t harmonics) noexcept {
+  constexpr double negligible = 1e-12;  // as a part of the power
+  if (!solve(regression, window, channel, input_)) return true;
+  double foreign = input_.residual_square / input_.sums.count;
+  for (std::size_t bin = tones; bin < tones + harmonics; ++bin) {
+    foreign += 0.5 * std::norm(phasor_of(input_.beta, bin));
+  }
+  return foreign <= negligible * input_.sums.square / input_.sums.count;
+}
+
+void WindowEstimator::take_distortion(const Pair& pair, std::size_t order,
+                                      Estimate& estimate) noexcept {
+  // A harmonic that is in the command itself may come out of a linear plant this much stronger than
+  // the tone does; what is louder is the plant's own doing, as are all under feedback.
+  constexpr double most_favoured = 100.0;
+  // Three times its expectation is what noise alone exceeds in one bin of twenty.
+  const double floor = 3.0 * 4.0 * output_.variance(order) / output_.sums.count;
+  double all = 0.0;
+  double own = 0.0;
+  for (std::size_t bin = tones_; bin < tones_ + harmonics_; ++bin) {
+    const double power = std::max(0.0, std::norm(phasor_of(output_.beta, bin)) - floor);
+    const double brought =
+        most_favoured * std::abs(estimate.response) * std::abs(phasor_of(input_.beta, bin));
+    all += power;
+    if (!pair.exact_input || power > brought * brought) own += power;
+  }
+  estimate.distortion = std::sqrt(all) / std::abs(estimate.output);
+  estimate.own_distortion = std::sqrt(own) / std::abs(estimate.output);
 }
 
 void WindowEstimator::take_coefficients(const Pair& pair, std::size_t order, std::size_t tone,
@@ -111,9 +182,12 @@ void WindowEstimator::take_coefficients(const Pair& pair, std::size_t order, std
     for (int k = 0; k < 2; ++k) {
       std::fill(column_.begin(), column_.end(), 0.0);
       column_[rows[k]] = 1.0;
+      column_[Regression::drift_row] = -solution.through_drift[rows[k]];
       solution.solver.solve(std::span{column_}.first(order));
-      block[k][0] = column_[rows[0]] * variance;
-      block[k][1] = column_[rows[1]] * variance;
+      for (int l = 0; l < 2; ++l) {
+        block[k][l] = variance * (column_[rows[l]] -
+                                  solution.through_drift[rows[l]] * column_[Regression::drift_row]);
+      }
     }
     return Covariance2{block[0][0], block[0][1], block[1][1]};
   };
@@ -122,8 +196,9 @@ void WindowEstimator::take_coefficients(const Pair& pair, std::size_t order, std
     const auto by_input = -estimate.response * input_.turn[tone] / estimate.input;
     estimate.white = sum(estimate.white, multiplied(covariance(input_), by_input));
   }
+  estimate.rms = std::sqrt(output_.sums.square / output_.sums.count);
   estimate.residual_rms = std::sqrt(output_.variance(order));
-  estimate.drift_per_sample = output_.beta[Regression::drift_row];
+  estimate.drift_per_block = output_.slope;
 }
 
 // How the cluster in cluster_ moves the coefficients: G⁻¹ (S_q − G_q β).
@@ -133,6 +208,8 @@ void WindowEstimator::influence(const Solution& solution, std::size_t order,
   multiply(cluster_.gram, {solution.beta.data(), order}, score);
   for (std::size_t i = 0; i < order; ++i) score[i] = cluster_.moments[i] - score[i];
   solution.solver.solve(score);
+  const double climbed = score[Regression::drift_row];
+  for (std::size_t i = 0; i < order; ++i) score[i] -= solution.through_drift[i] * climbed;
 }
 
 // Mean square of what a white residual of one makes of the tone's influence of the cluster in
@@ -144,6 +221,7 @@ double WindowEstimator::white_influence(std::size_t order, std::size_t tone) noe
     const std::span g{column_.data(), order};
     std::fill(g.begin(), g.end(), 0.0);
     g[row] = 1.0;
+    g[Regression::drift_row] = -output_.through_drift[row];
     output_.solver.solve(g);
     const std::span weighted{moved_output_.data(), order};
     const std::span back{scratch_.data(), order};
@@ -179,7 +257,7 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
   for (Estimate& estimate : estimates) estimate.scatter_white = 0.0;
   for (std::size_t end = window.last; end >= window.first + window.cluster; end -= window.cluster) {
     const std::size_t begin = end - window.cluster;
-    regression.window(pair.output, begin, end, cluster_);
+    load(regression, window, begin, end, pair.output, output_.slope, cluster_);
     for (std::size_t tone = 0; tone < estimates.size(); ++tone) {
       estimates[tone].scatter_white += white_influence(order, tone);
     }
@@ -193,7 +271,7 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
       early = std::max(early, residual);
     }
     if (!pair.exact_input) {
-      regression.window(pair.input, begin, end, cluster_);
+      load(regression, window, begin, end, pair.input, input_.slope, cluster_);
       influence(input_, order, moved_input_);
     }
     for (std::size_t tone = 0; tone < estimates.size(); ++tone) {

@@ -37,20 +37,25 @@ struct Window {
   std::size_t first = 0;
   std::size_t last = 0;
   std::size_t cluster = 1;  // checkpoints per cluster
-  bool settled = false;     // for certain: what is loud at its beginning is not a transient
+  // Checkpoints per block where the drift is to be taken from the means of the blocks, which
+  // unmodelled harmonics leave alone; 0: from all samples.
+  std::size_t block = 0;
+  bool settled = false;  // for certain: what is loud at its beginning is not a transient
 };
 
 struct Estimate {
   std::complex<double> response;
   std::complex<double> input;  // U and Y at their true times, b + j a
   std::complex<double> output;
-  Covariance2 white;           // of H, were the residual white
-  double scatter = 0.0;        // variance of one component of H from the clusters
-  double scatter_white = 0.0;  // what that scatter is to white noise of one in the output
-  double scatter_dof = 0.0;    // 0: too few clusters
-  double residual_rms = 0.0;   // of the output
-  double distortion = 0.0;     // of the output: harmonics beyond the noise, relative to the tone
-  double drift_per_sample = 0.0;
+  Covariance2 white;            // of H, were the residual white
+  double scatter = 0.0;         // variance of one component of H from the clusters
+  double scatter_white = 0.0;   // what that scatter is to white noise of one in the output
+  double scatter_dof = 0.0;     // 0: too few clusters
+  double rms = 0.0;             // of the output, all tones
+  double residual_rms = 0.0;    // of the output
+  double distortion = 0.0;      // of the output: harmonics beyond the noise, relative to the tone
+  double own_distortion = 0.0;  // … without those that harmonics of the input may explain
+  double drift_per_block = 0.0;
   double burst = 0.0;    // residual power of the worst cluster over that of the others
   double lost = 0.0;     // samples of the output that are missing
   double samples = 0.0;  // of the output that were used
@@ -72,6 +77,11 @@ class WindowEstimator {
                 std::span<const double> omega_rad_s, std::size_t harmonics,
                 std::span<Estimate> estimates) noexcept SINERIG_NONBLOCKING;
 
+  // Whether a channel is its tones alone over the window, on a constant or a bias motion, within a
+  // millionth.
+  bool is_sinusoidal(const Regression& regression, const Window& window, std::size_t channel,
+                     std::size_t tones, std::size_t harmonics) noexcept SINERIG_NONBLOCKING;
+
   // Of the window last estimated: how far its late part, from checkpoint `late_first` on, strays
   // from the whole, both fitted without the drift and the harmonics, which in a single cycle would
   // swallow a ringing transient. The noise is that of the late part, but
@@ -87,10 +97,16 @@ class WindowEstimator {
     NormalSolver solver;
     std::vector<double> beta;
     double residual_square = 0.0;
+    double slope = 0.0;                 // drift per block
+    std::vector<double> through_drift;  // what an error of the staircase makes of each coefficient
     std::vector<std::complex<double>> turn;  // per tone: from the tick to the samples' true time
 
     explicit Solution(std::size_t max_order)
-        : sums{max_order}, solver{max_order}, beta(max_order), turn(max_order) {}
+        : sums{max_order},
+          solver{max_order},
+          beta(max_order),
+          through_drift(max_order),
+          turn(max_order) {}
     double variance(std::size_t order) const noexcept;
   };
 
@@ -105,8 +121,12 @@ class WindowEstimator {
 
   bool solve(const Regression& regression, const Window& window, std::size_t channel,
              Solution& solution) noexcept;
+  void load(const Regression& regression, const Window& window, std::size_t first, std::size_t last,
+            std::size_t channel, double slope, NormalSums& sums) noexcept;
+  void take_slope(Solution& solution, std::size_t order) noexcept;
   void take_coefficients(const Pair& pair, std::size_t order, std::size_t tone,
                          Estimate& estimate) noexcept;
+  void take_distortion(const Pair& pair, std::size_t order, Estimate& estimate) noexcept;
   void take_clusters(const Regression& regression, const Window& window, const Pair& pair,
                      std::span<Estimate> estimates) noexcept;
   double white_influence(std::size_t order, std::size_t tone) noexcept;
@@ -120,6 +140,8 @@ class WindowEstimator {
   std::size_t tones_ = 0;
   std::size_t harmonics_ = 0;  // bins that follow the tones
   NormalSums cluster_;
+  Staircase stairs_;
+  std::vector<double> drift_products_;  // of the drift with the instruments
   NormalSolver plain_solver_;
   std::vector<double> plain_gram_;
   Plain whole_;

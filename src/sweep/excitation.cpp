@@ -22,6 +22,8 @@ double Excitation::carried_phase_rad() const noexcept {
 }
 
 void Excitation::start(const Dwell& dwell, double scale) noexcept {
+  const double last = tones_ == 0 ? 0.0 : tones();
+  const bool several = tones_ > 1 || dwell.tones.size() > 1;
   const double carried = tones_ == 1 && dwell.tones.size() == 1 ? carried_phase_rad() : 0.0;
   tones_ = dwell.tones.size();
   bins_ = dwell.bins();
@@ -31,7 +33,8 @@ void Excitation::start(const Dwell& dwell, double scale) noexcept {
   for (const Tone& tone : dwell.tones) loudness = std::max(loudness, scale * tone.amplitude);
   // Only upward: a larger amplitude carried into a dwell would exceed what its plan was checked
   // for.
-  from_scale_ = std::min(1.0, loudness_ / loudness);
+  from_scale_ = several ? 1.0 : std::min(1.0, loudness_ / loudness);
+  handover_ = 0.0;
   loudness_ = loudness;
   for (std::size_t i = 0; i < tones_; ++i) {
     const Tone& tone = dwell.tones[i];
@@ -42,6 +45,7 @@ void Excitation::start(const Dwell& dwell, double scale) noexcept {
                   .start_rad = start_rad};
   }
   refresh();
+  if (several) handover_ = last - tones();
 }
 
 void Excitation::advance(std::uint64_t ticks) noexcept {
@@ -54,12 +58,13 @@ void Excitation::advance(std::uint64_t ticks) noexcept {
 
 void Excitation::refresh() noexcept {
   for (std::size_t i = 0; i < tones_; ++i) phasors_[i] = voices_[i].phase.phasor();
-  const Phasor& tone = phasors_[0];
+  const Phasor tone = phasors_[0];
   const std::size_t harmonics_end = bins_ - (baseline_.oscillates() ? 1 : 0);
+  Phasor harmonic = tone;
   for (std::size_t i = tones_; i < harmonics_end; ++i) {
-    const Phasor& below = i == tones_ ? tone : phasors_[i - 1];
-    phasors_[i] = {.cosine = below.cosine * tone.cosine - below.sine * tone.sine,
-                   .sine = below.sine * tone.cosine + below.cosine * tone.sine};
+    harmonic = {.cosine = harmonic.cosine * tone.cosine - harmonic.sine * tone.sine,
+                .sine = harmonic.sine * tone.cosine + harmonic.cosine * tone.sine};
+    phasors_[i] = harmonic;
   }
   if (baseline_.oscillates()) {
     oscillation_phasor_ = oscillation_.phasor();
@@ -74,7 +79,7 @@ double Excitation::tones() const noexcept {
   }
   if (elapsed_ >= ramp_samples_) return sum;
   const double progress = static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_);
-  return sum * (from_scale_ + (1.0 - from_scale_) * progress);
+  return sum * (from_scale_ + (1.0 - from_scale_) * progress) + handover_ * (1.0 - progress);
 }
 
 double Excitation::baseline() const noexcept {

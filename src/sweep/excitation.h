@@ -19,7 +19,8 @@ class Excitation {
   Excitation(std::size_t max_tones, std::size_t max_bins, const Baseline& baseline);
 
   // Begins a dwell. A single tone goes on from the phase that the single tone before has reached,
-  // so that the command has no step; after whole cycles that is zero. Over the ramp the envelope
+  // so that the command has no step; after whole cycles that is zero. Where there are several tones
+  // the step is faded out over the ramp. Over the ramp the envelope
   // moves from the amplitude of the dwell before to `scale` times the planned one: no step there
   // either.
   void start(const Dwell& dwell, double scale) noexcept SINERIG_NONBLOCKING;
@@ -65,7 +66,8 @@ class Excitation {
   std::size_t bins_ = 0;
   std::uint64_t elapsed_ = 0;
   std::uint64_t ramp_samples_ = 0;
-  double loudness_ = 0.0;    // largest amplitude of the running dwell
+  double loudness_ = 0.0;  // largest amplitude of the running dwell
+  double handover_ = 0.0;  // what the tones before stood above these at the start, of several tones
   double from_scale_ = 1.0;  // where the envelope begins, of the running dwell's amplitudes
   bool closing_ = false;
   std::uint64_t closing_samples_ = 0;

@@ -188,7 +188,9 @@ std::string describe(const Trip& trip, const std::vector<std::string>& channel_n
                       trip.value, trip.limit);
       break;
     case TripCause::recorder_stalled: what = "the recorder no longer takes points"; break;
-    case TripCause::clock_lost: what = "the loop can no longer keep its rate"; break;
+    case TripCause::clock_lost:
+      what = with("the loop stood still for %.3g s (at most %.3g s)", trip.value, trip.limit);
+      break;
   }
   return what + with(" (tick %.0f; command changed to %.6g)", static_cast<double>(trip.tick),
                      trip.command);

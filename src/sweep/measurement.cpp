@@ -15,6 +15,9 @@ namespace {
 constexpr double db_per_relative = 20.0 / std::numbers::ln10;
 constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
 
+// The regression's channel of what was applied.
+constexpr std::size_t applied_row = 0;
+
 // Checkpoints of a dwell: enough to drop a quarter of a short window, few enough to keep.
 constexpr std::size_t max_checkpoints = 65;
 
@@ -71,7 +74,7 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
       judgement_{judgement},
       rate_hz_{rate_hz},
       max_tones_{max_tones},
-      regression_{channels, max_bins, max_checkpoints},
+      regression_{channels, max_bins, max_checkpoints, max_parts},
       estimator_{max_bins},
       memories_(pairs_.size()),
       results_(pairs_.size() * max_tones),
@@ -88,12 +91,9 @@ void Measurement::start(const Dwell& dwell) noexcept {
   for (std::uint32_t order = 2; order <= dwell.harmonics; ++order)
     omega_[bin++] = order * omega_[0];
   if (dwell.bias_hz > 0.0) omega_[bin++] = 2.0 * std::numbers::pi * dwell.bias_hz;
-  // Over whole cycles a drift is not orthogonal to the harmonics of a clamped or quantised command;
-  // a fixed window keeps to the plain sums of the definition, which are.
-  const double drift_samples = judgement_.settling == Settling::fixed
-                                   ? std::numeric_limits<double>::infinity()
-                                   : static_cast<double>(dwell.block_samples);
-  regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_, drift_samples);
+  regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
+                    static_cast<double>(dwell.block_samples),
+                    dwell.bias_hz > 0.0 ? 0 : dwell.parts);
   std::fill(results_.begin(), results_.end(), Result{});
   restart();
 }
@@ -108,6 +108,7 @@ void Measurement::restart() noexcept {
   block_complete_ = true;
   block_ended_ = false;
   settled_ = judgement_.settling == Settling::fixed;
+  whole_blocks_ = judgement_.settling == Settling::fixed;
   done_ = false;
   regression_.begin_block();
 }
@@ -159,18 +160,15 @@ Window Measurement::current_window() noexcept {
   const std::size_t last = regression_.checkpoints() - 1;
   const std::size_t per_block = std::max<std::size_t>(1, dwell_->parts / stride_);
   const std::size_t blocks = (last - first_) / per_block;
-  const bool settled = judgement_.settling == Settling::fixed;
-  if (blocks < few_blocks) {
-    return {.first = first_,
-            .last = last,
-            .cluster = std::max<std::size_t>(1, per_block / 2),
-            .settled = settled};
+  Window window{.first = first_, .last = last, .settled = judgement_.settling == Settling::fixed};
+  if (whole_blocks_ && blocks > 0) {
+    window.first = last - blocks * per_block;
+    window.block = per_block;
   }
   const std::size_t merged = (blocks + most_clusters - 1) / most_clusters;
-  return {.first = first_,
-          .last = last,
-          .cluster = per_block * std::max<std::size_t>(1, merged),
-          .settled = settled};
+  window.cluster = blocks < few_blocks ? std::max<std::size_t>(1, per_block / 2)
+                                       : per_block * std::max<std::size_t>(1, merged);
+  return window;
 }
 
 bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {
@@ -269,11 +267,22 @@ bool Measurement::target_met() const noexcept {
 }
 
 void Measurement::judge() noexcept {
-  const Window window = current_window();
-  const std::uint64_t length =
-      regression_.samples_at(window.last) - regression_.samples_at(window.first);
-  if (length < dwell_->blocks * dwell_->block_samples) return;
   if (samples_ < next_look_) return;
+  Window window = current_window();
+  const auto samples_of = [&] {
+    return regression_.samples_at(window.last) - regression_.samples_at(window.first);
+  };
+  if (samples_of() < dwell_->blocks * dwell_->block_samples) return;
+  if (!whole_blocks_ && !estimator_.is_sinusoidal(regression_, window, applied_row,
+                                                  dwell_->tones.size(), dwell_->harmonic_bins())) {
+    whole_blocks_ = true;
+    window = current_window();
+  }
+  const std::uint64_t length = samples_of();
+  const std::uint64_t least_blocks = whole_blocks_ && !window.settled ? 2 : 1;
+  if (length < std::max<std::uint64_t>(least_blocks, dwell_->blocks) * dwell_->block_samples) {
+    return;
+  }
   const auto waited =
       static_cast<double>(regression_.samples_at(window.first) - regression_.samples_at(0));
   if (static_cast<double>(length) < window_per_wait * waited) return;
@@ -340,14 +349,14 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
       20.0 * std::log10(point.output_amplitude / std::numbers::sqrt2 / estimate.residual_rms);
   point.distortion = estimate.distortion;
   point.drift_per_s =
-      estimate.drift_per_sample / static_cast<double>(dwell_->block_samples) * rate_hz_;
+      estimate.drift_per_block / static_cast<double>(dwell_->block_samples) * rate_hz_;
   point.samples = estimate.samples;
   point.lost = estimate.lost;
   const double loud = estimate.burst - 1.0;
   const double samples_per_cluster = estimate.samples / (0.5 * estimate.scatter_dof + 1.0);
-  // Above this the residual is the rounding of the running totals (131 dB at 100 kHz), which has no
+  // Below this the residual is the rounding of the running totals (131 dB at 100 kHz), which has no
   // statistics.
-  const bool real_noise = point.snr_db < 120.0;
+  const bool real_noise = estimate.residual_rms > 1e-6 * estimate.rms;
   const bool burst = real_noise && estimate.burst > burst_ratio &&
                      loud > 8.0 * std::sqrt(2.0 / samples_per_cluster);
   const auto mark = [&](PointStatus status, PointReason reason, double value) {
@@ -361,8 +370,8 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
     mark(PointStatus::unsettled, PointReason::still_moving, db_per_relative * each.left);
   } else if (burst) {
     mark(PointStatus::low_signal, PointReason::noise_burst, estimate.burst);
-  } else if (estimate.distortion > judgement_.max_distortion) {
-    mark(PointStatus::distorted, PointReason::harmonics, estimate.distortion);
+  } else if (estimate.own_distortion > judgement_.max_distortion) {
+    mark(PointStatus::distorted, PointReason::harmonics, estimate.own_distortion);
   } else if (pair == 0 && judgement_.has_target() && !target_met()) {
     mark(PointStatus::low_signal, PointReason::target_not_reached, half.gain_db);
   } else if (!(gain > 0.0)) {

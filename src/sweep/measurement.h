@@ -106,6 +106,9 @@ class Measurement {
   std::uint64_t next_look_ = 0;
   std::size_t first_ = 0;   // checkpoint at which the window under judgement begins
   std::size_t stride_ = 1;  // of the regression when first_ was set
+  // What was applied has harmonics that the regression does not model (a clamped or a coarse
+  // command): they are orthogonal to the tone over whole blocks only.
+  bool whole_blocks_ = false;
   bool block_complete_ = true;
   bool block_ended_ = false;
   bool settled_ = false;

@@ -5,6 +5,9 @@
 #include <cstdio>
 #include <numbers>
 
+#include "sweep/motion_check.h"
+#include "sweep/multitone.h"
+
 namespace sinerig {
 
 namespace {
@@ -63,59 +66,34 @@ void check_band(const SweepSettings& sweep, double rate_hz) {
   check("stop_hz", sweep.stop_hz);
 }
 
-double sine_slew(double amplitude, double frequency_hz, double rate_hz) {
-  return 2.0 * amplitude * std::sin(two_pi * frequency_hz / rate_hz / 2.0) * rate_hz;
-}
-
-void check_motion(const SweepSettings& sweep, const MotionLimits& limits, double frequency_hz,
-                  double amplitude, double rate_hz) {
-  const double omega_rad_s = two_pi * frequency_hz;
-  const double slew_per_s = sine_slew(amplitude, frequency_hz, rate_hz);
-  const char* amplitude_key = sweep.amplitude_table.empty() ? "amplitude" : "amplitude_table";
-  const auto refuse = [&](const char* what, double value, const char* limit_key, double limit) {
-    throw PlanRefused("sweep", amplitude_key,
-                      std::string{what} + " of " + number(value) + " at " + number(frequency_hz) +
-                          " Hz: exceeds [limits] " + limit_key + " = " + number(limit) +
-                          "; lower the amplitude there or raise the limit");
-  };
-  const double baseline = sweep.neutral + sweep.offset;
-  const double reach = amplitude + sweep.bias_amplitude;
-  if (baseline + reach > limits.command_max) {
-    refuse("a command", baseline + reach, "command_max", limits.command_max);
-  }
-  if (baseline - reach < limits.command_min) {
-    refuse("a command", baseline - reach, "command_min", limits.command_min);
-  }
-  if (slew_per_s > limits.slew_per_s) {
-    refuse("a slew", slew_per_s, "slew_per_s", limits.slew_per_s);
-  }
-  if (amplitude * omega_rad_s > limits.velocity_max) {
-    refuse("a peak velocity", amplitude * omega_rad_s, "velocity_max", limits.velocity_max);
-  }
-  if (amplitude * omega_rad_s * omega_rad_s > limits.acceleration_max) {
-    refuse("a peak acceleration", amplitude * omega_rad_s * omega_rad_s, "acceleration_max",
-           limits.acceleration_max);
-  }
-}
-
 // Parts of a block: short enough to see a transient go within a cycle, long enough to be worth
 // keeping.
 std::uint32_t part_count(std::uint64_t block_samples) {
   constexpr std::uint64_t shortest_part = 16;
   std::uint32_t parts = 1;
-  while (parts < 8 && block_samples / 2 / parts >= shortest_part) parts *= 2;
+  while (parts < max_parts && block_samples / 2 / parts >= shortest_part) parts *= 2;
   return parts;
 }
 
-// Harmonics that stay below half the rate and apart from their images.
-std::uint32_t harmonic_count(std::uint32_t wanted, const CoherentFrequency& base) {
+// Harmonics of the first tone that stay below half the rate, apart from their images and from the
+// other tones.
+std::uint32_t harmonic_count(std::uint32_t wanted, const CoherentFrequency& base,
+                             const std::vector<Tone>& tones) {
+  const auto taken = [&](std::uint64_t cycles) {
+    return std::any_of(tones.begin(), tones.end(),
+                       [=](const Tone& tone) { return tone.cycles == cycles; });
+  };
   std::uint32_t highest = 1;
-  while (highest < wanted && 2 * base.cycles * (highest + 1) < base.samples) ++highest;
+  while (highest < wanted && 2 * base.cycles * (highest + 1) < base.samples &&
+         !taken(base.cycles * (highest + 1))) {
+    ++highest;
+  }
   return highest;
 }
 
-Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz, const Dwell* before) {
-  const CoherentFrequency base = snap(asked_hz, rate_hz, sweep.frequency_tolerance);
+// `base` is the shortest block, whole cycles of every tone, and the lowest tone's cycles in it.
+Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Tone> tones,
+                 const SweepSettings& sweep, double rate_hz, const Dwell* before) {
   const auto base_samples = static_cast<double>(base.samples);
   const double samples_per_cycle = base_samples / static_cast<double>(base.cycles);
   const auto length = [&](const Span& span, double unit_samples) {
@@ -124,15 +102,17 @@ Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz, co
 
   const double bases = std::max(1.0, length(sweep.block, base_samples));
   const double block_samples = bases * base_samples;
-  const double frequency_hz = base.hz(rate_hz);
-  const double amplitude = amplitude_at(sweep, frequency_hz);
-  const bool changes = before != nullptr && before->tones.front().amplitude != amplitude;
+  const auto same_amplitude = [&](const Dwell& other) {
+    return tones.size() == 1 && other.tones.size() == 1 &&
+           other.tones.front().amplitude == tones.front().amplitude;
+  };
+  const bool changes = before != nullptr ? !same_amplitude(*before) : tones.size() > 1;
   const double ramp_samples =
       std::ceil(std::max(sweep.ramp_s * rate_hz, changes ? samples_per_cycle / 2.0 : 0.0) - 1e-9);
   // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
   const double settle_unit = sweep.settling == Settling::fixed ? base_samples : 1.0;
-  const double settle_samples = settle_unit * std::max(std::ceil(ramp_samples / settle_unit),
-                                                       length(sweep.settle, settle_unit));
+  const double settle_samples =
+      settle_unit * (std::ceil(ramp_samples / settle_unit) + length(sweep.settle, settle_unit));
   const double blocks = std::max(1.0, length(sweep.integrate, block_samples));
   const bool open_ended = sweep.has_target() || sweep.settling == Settling::detect;
   double max_samples = settle_samples + blocks * block_samples;
@@ -154,10 +134,49 @@ Dwell make_dwell(double asked_hz, const SweepSettings& sweep, double rate_hz, co
   dwell.settle_samples = static_cast<std::uint64_t>(settle_samples);
   dwell.blocks = static_cast<std::uint32_t>(blocks);
   dwell.max_samples = static_cast<std::uint64_t>(max_samples);
-  dwell.tones = {
-      {.cycles = base.cycles * static_cast<std::uint64_t>(bases), .amplitude = amplitude}};
-  dwell.harmonics = harmonic_count(sweep.harmonics, base);
+  dwell.harmonics = harmonic_count(sweep.harmonics, base, tones);
+  for (Tone& tone : tones) tone.cycles *= static_cast<std::uint64_t>(bases);
+  dwell.tones = std::move(tones);
   return dwell;
+}
+
+Dwell make_single(double asked_hz, const SweepSettings& sweep, double rate_hz,
+                  const Dwell* before) {
+  const CoherentFrequency base = snap(asked_hz, rate_hz, sweep.frequency_tolerance);
+  const double amplitude = amplitude_at(sweep, base.hz(rate_hz));
+  return make_dwell(asked_hz, base, {{.cycles = base.cycles, .amplitude = amplitude}}, sweep,
+                    rate_hz, before);
+}
+
+// The tones of a group share the peak that the loudest of them would have alone.
+Dwell make_group(const std::vector<double>& asked_hz, const SweepSettings& sweep, double rate_hz,
+                 const Dwell* before) {
+  if (asked_hz.size() == 1) return make_single(asked_hz.front(), sweep, rate_hz, before);
+  const CommonBlock block = common_block(asked_hz, rate_hz, sweep.frequency_tolerance,
+                                         sweep.tones_tolerance, sweep.odd_bins);
+  if (block.samples == 0) {
+    throw PlanRefused("sweep", "tones_tolerance",
+                      "no block of up to 256 cycles of " + number(asked_hz.front()) +
+                          " Hz is whole cycles of all the tones with it (up to " +
+                          number(asked_hz.back()) + " Hz): allow more, or ask for fewer tones");
+  }
+  const CoherentFrequency base{.cycles = block.cycles.front(), .samples = block.samples};
+  std::vector<double> amplitudes;
+  for (const std::uint64_t cycles : block.cycles) {
+    const CoherentFrequency tone{.cycles = cycles, .samples = block.samples};
+    amplitudes.push_back(amplitude_at(sweep, tone.hz(rate_hz)));
+  }
+  const std::vector<double> phases_rad = low_crest_phases(block, amplitudes);
+  const double loudest = *std::max_element(amplitudes.begin(), amplitudes.end());
+  const double share =
+      std::min(1.0, loudest / peaks_of(block, amplitudes, phases_rad, rate_hz).value);
+  std::vector<Tone> tones;
+  for (std::size_t i = 0; i < amplitudes.size(); ++i) {
+    tones.push_back({.cycles = block.cycles[i],
+                     .amplitude = amplitudes[i] * share,
+                     .phase_rad = phases_rad[i]});
+  }
+  return make_dwell(asked_hz.front(), base, std::move(tones), sweep, rate_hz, before);
 }
 
 Baseline make_baseline(const SweepSettings& sweep, double rate_hz) {
@@ -170,37 +189,30 @@ Baseline make_baseline(const SweepSettings& sweep, double rate_hz) {
   return baseline;
 }
 
-void check_baseline(const Baseline& baseline, const MotionLimits& limits, double rate_hz) {
-  const double ramp_ticks = std::max(1.0, static_cast<double>(baseline.ramp_samples));
-  const double slew_per_s = std::abs(baseline.offset) / ramp_ticks * rate_hz;
-  if (slew_per_s <= limits.slew_per_s) return;
-  throw PlanRefused("sweep", "offset",
-                    "a slew of " + number(slew_per_s) +
-                        " on the way from neutral: exceeds [limits] slew_per_s = " +
-                        number(limits.slew_per_s) + "; give it a longer ramp_s");
-}
+struct AskedGroup {
+  std::vector<double> frequencies_hz;
+  std::uint32_t sub_band = 0;
+};
 
-// A dwell may begin anywhere in the cycle: a change of amplitude needs half a cycle at least, or
-// the command would jump. The envelope adds to the slew of the sine, change / ramp per tick, or
-// change · ω from rest where the ramp is shorter than the sine takes to get there.
-void check_ramp(const Dwell& dwell, double amplitude_before, const MotionLimits& limits,
-                double rate_hz) {
-  const double amplitude = dwell.tones.front().amplitude;
-  if (dwell.ramp_samples == 0 || amplitude == amplitude_before) return;
-  const double frequency_hz = dwell.frequency_hz(rate_hz);
-  const double slew_per_s =
-      sine_slew(std::max(amplitude, amplitude_before), frequency_hz, rate_hz) +
-      std::abs(amplitude - amplitude_before) *
-          std::min(rate_hz / static_cast<double>(dwell.ramp_samples), two_pi * frequency_hz);
-  if (slew_per_s <= limits.slew_per_s) return;
-  throw PlanRefused("sweep", "ramp_s",
-                    "a slew of up to " + number(slew_per_s) + " on the ramp to " +
-                        number(frequency_hz) +
-                        " Hz: exceeds [limits] slew_per_s = " + number(limits.slew_per_s) +
-                        "; lengthen the ramp, lower the amplitude there or raise the limit");
+// What is measured in one dwell each; no group reaches over the edge of a sub-band.
+std::vector<AskedGroup> groups_of(const std::vector<AskedFrequency>& asked, std::size_t tones) {
+  std::vector<AskedGroup> groups;
+  for (std::size_t first = 0; first < asked.size();) {
+    const std::uint32_t sub_band = asked[first].sub_band;
+    std::vector<double> band;
+    for (; first < asked.size() && asked[first].sub_band == sub_band; ++first)
+      band.push_back(asked[first].hz);
+    if (tones > 1) {
+      for (const auto& group : interleaved(band, tones)) groups.push_back({group, sub_band});
+    } else {
+      for (const double hz : band) groups.push_back({{hz}, sub_band});
+    }
+  }
+  return groups;
 }
 
 bool same_frequency(const Dwell& a, const Dwell& b) {
+  if (a.tones.size() > 1 || b.tones.size() > 1) return false;
   return a.tones.front().cycles * b.block_samples == b.tones.front().cycles * a.block_samples;
 }
 
@@ -243,16 +255,15 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,
                     .max_distortion = sweep.max_distortion};
-  for (const AskedFrequency& each : asked) {
+  for (const AskedGroup& group : groups_of(asked, sweep.tones)) {
     const Dwell* before = plan.dwells.empty() ? nullptr : &plan.dwells.back();
-    Dwell dwell = make_dwell(each.hz, sweep, rate_hz, before);
-    dwell.sub_band = each.sub_band;
+    Dwell dwell = make_group(group.frequencies_hz, sweep, rate_hz, before);
+    dwell.sub_band = group.sub_band;
     const bool duplicate =
         std::any_of(plan.dwells.begin(), plan.dwells.end(),
                     [&](const Dwell& other) { return same_frequency(dwell, other); });
     if (duplicate) continue;
-    check_motion(sweep, limits, dwell.frequency_hz(rate_hz), dwell.tones.front().amplitude,
-                 rate_hz);
+    check_motion(sweep, limits, dwell, rate_hz);
     if (plan.baseline.oscillates()) dwell.bias_hz = plan.baseline.oscillation.hz(rate_hz);
     check_ramp(dwell, before == nullptr ? 0.0 : before->tones.front().amplitude, limits, rate_hz);
     plan.dwells.push_back(std::move(dwell));

@@ -58,6 +58,9 @@ struct SweepSettings {
   std::vector<SubBand> sub_bands;
   std::vector<double> frequencies_hz;  // for Spacing::list, in the order to be run
   double frequency_tolerance = 1e-3;   // relative, for the snap to whole cycles in whole samples
+  std::uint32_t tones = 1;             // in one dwell, at most
+  double tones_tolerance = 0.03;       // relative, of the tones above the lowest of a dwell
+  bool odd_bins = false;               // every tone an odd number of cycles in the block
 
   double neutral = 0.0;                         // the command at rest
   double offset = 0.0;                          // from neutral: what the sines are laid on …
@@ -94,6 +97,8 @@ struct MotionLimits {
   double velocity_max = unlimited;      // A·ω
   double acceleration_max = unlimited;  // A·ω²
 };
+
+inline constexpr std::uint32_t max_parts = 8;  // that a block is cut into
 
 struct Tone {
   std::uint64_t cycles = 0;  // per block

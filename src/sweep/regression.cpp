@@ -15,41 +15,17 @@ std::size_t full_width(std::size_t channels, std::size_t max_bins) {
   return triangle(order) + channels * (triangle(order) + order + 2);
 }
 
-// gram += sign · x xᵀ, with the order known to the compiler: this is most of what a tick costs.
-template <std::size_t order>
-void add_outer_of(double* gram, const double* x, double sign) noexcept {
-  for (std::size_t i = 0; i < order; ++i) {
-    const double factor = sign * x[i];
-    for (std::size_t j = 0; j <= i; ++j) gram[triangle(i) + j] += factor * x[j];
-  }
-}
-
-void add_outer(double* gram, const double* x, std::size_t order, double sign) noexcept {
-  switch (order) {
-    case 4: return add_outer_of<4>(gram, x, sign);
-    case 6: return add_outer_of<6>(gram, x, sign);
-    case 8: return add_outer_of<8>(gram, x, sign);
-    case 10: return add_outer_of<10>(gram, x, sign);
-    default: break;
-  }
-  for (std::size_t i = 0; i < order; ++i) {
-    const double factor = sign * x[i];
-    for (std::size_t j = 0; j <= i; ++j) gram[j] += factor * x[j];
-    gram += i + 1;
-  }
-}
-
 }  // namespace
 
-Regression::Regression(std::size_t channels, std::size_t max_bins, std::size_t checkpoints)
+Regression::Regression(std::size_t channels, std::size_t max_bins, std::size_t checkpoints,
+                       std::size_t max_parts)
     : channels_{channels},
       // An odd number of checkpoints, an even one of windows, so that merging keeps the newest.
       capacity_{checkpoints | 1U},
       capacity_width_{full_width(channels, max_bins)},
       omega_(max_bins),
-      references_(channels),
-      offsets_(channels),
-      seen_(channels),
+      states_(channels),
+      part_gram_{2 + 2 * max_bins, max_parts},
       totals_(capacity_width_),
       block_start_(channels * (3 + 2 * max_bins)),
       x_(2 + 2 * max_bins),
@@ -57,15 +33,16 @@ Regression::Regression(std::size_t channels, std::size_t max_bins, std::size_t c
       samples_(capacity_),
       store_(capacity_ * capacity_width_) {}
 
-void Regression::start(std::span<const double> omega_rad_s, double period_s,
-                       double drift_samples) noexcept {
+void Regression::start(std::span<const double> omega_rad_s, double period_s, double drift_samples,
+                       std::size_t parts) noexcept {
   bins_ = omega_rad_s.size();
   period_s_ = period_s;
   drift_scale_ = 1.0 / drift_samples;
   ticks_ = 0;
   std::copy(omega_rad_s.begin(), omega_rad_s.end(), omega_.begin());
-  std::fill(seen_.begin(), seen_.end(), false);
+  std::fill(states_.begin(), states_.end(), ChannelState{});
   std::fill(totals_.begin(), totals_.end(), 0.0);
+  part_gram_.start(order(), parts);
   forget();
 }
 
@@ -82,40 +59,59 @@ void Regression::shift(std::span<const Phasor> phasors, double seconds) noexcept
   }
 }
 
-void Regression::add(std::span<const Phasor> phasors,
-                     std::span<const Observation> observations) noexcept {
+void Regression::set_regressors(std::span<const Phasor> phasors, double drift) noexcept {
   x_[constant_row] = 1.0;
-  x_[drift_row] = static_cast<double>(ticks_) * drift_scale_;
+  x_[drift_row] = drift;
   for (std::size_t bin = 0; bin < bins_; ++bin) {
     x_[cosine_row(bin)] = phasors[bin].cosine;
     x_[sine_row(bin)] = phasors[bin].sine;
   }
-  const std::size_t rows = order();
-  add_outer(totals_.data(), x_.data(), rows, 1.0);
+}
 
+// A sample that is not there, or not on the grid: puts right what the shared Gram matrix takes for
+// granted. Leaves the regressors of the sample in shifted_.
+void Regression::correct(std::size_t channel, std::span<const Phasor> phasors, double drift,
+                         std::int64_t off_grid_ns, bool missing) noexcept {
+  double* gram = &totals_[gram_at(channel)];
+  set_regressors(phasors, drift);
+  add_outer(gram, x_.data(), order(), -1.0);
+  if (missing) return;
+  shift(phasors, static_cast<double>(off_grid_ns) * 1e-9);
+  add_outer(gram, shifted_.data(), order(), 1.0);
+}
+
+void Regression::add(std::span<const Phasor> phasors,
+                     std::span<const Observation> observations) noexcept {
+  if (part_gram_.learning()) {
+    set_regressors(phasors, static_cast<double>(ticks_ - part_start_) * drift_scale_);
+    part_gram_.add(std::span<const double>{x_.data(), order()});
+  }
+  const double drift = static_cast<double>(ticks_) * drift_scale_;
+  const std::size_t rows = order();
   for (std::size_t channel = 0; channel < channels_; ++channel) {
     const Observation& observation = observations[channel];
-    double* gram = &totals_[gram_at(channel)];
-    double* moments = &totals_[moments_at(channel)];
+    ChannelState& state = states_[channel];
     if (observation.missing) {
-      add_outer(gram, x_.data(), rows, -1.0);
+      correct(channel, phasors, drift, 0, true);
       continue;
     }
-    if (!seen_[channel]) {
-      seen_[channel] = true;
-      references_[channel] = observation.value;
-      offsets_[channel] = observation.offset_ns;
+    if (!state.seen) {
+      state = {.reference = observation.value, .offset_ns = observation.offset_ns, .seen = true};
     }
-    const double value = observation.value - references_[channel];
-    const std::int64_t off_grid_ns = observation.offset_ns - offsets_[channel];
-    const double* x = x_.data();
+    double* moments = &totals_[moments_at(channel)];
+    const double value = observation.value - state.reference;
+    const std::int64_t off_grid_ns = observation.offset_ns - state.offset_ns;
     if (std::abs(off_grid_ns) > grid_tolerance_ns) {
-      shift(phasors, static_cast<double>(off_grid_ns) * 1e-9);
-      add_outer(gram, x_.data(), rows, -1.0);
-      add_outer(gram, shifted_.data(), rows, 1.0);
-      x = shifted_.data();
+      correct(channel, phasors, drift, off_grid_ns, false);
+      for (std::size_t i = 0; i < rows; ++i) moments[i] += shifted_[i] * value;
+    } else {
+      moments[constant_row] += value;
+      moments[drift_row] += drift * value;
+      for (std::size_t bin = 0; bin < bins_; ++bin) {
+        moments[cosine_row(bin)] += phasors[bin].cosine * value;
+        moments[sine_row(bin)] += phasors[bin].sine * value;
+      }
     }
-    for (std::size_t i = 0; i < rows; ++i) moments[i] += x[i] * value;
     moments[rows] += value * value;
     moments[rows + 1] += 1.0;
   }
@@ -137,7 +133,7 @@ Coefficients Regression::block_coefficients(std::size_t channel, std::size_t bin
   };
   return {.a = 2.0 / samples * sum(cosine_row(bin)),
           .b = 2.0 / samples * sum(sine_row(bin)),
-          .mean = references_[channel] + sum(constant_row) / samples};
+          .mean = states_[channel].reference + sum(constant_row) / samples};
 }
 
 double Regression::block_power(std::size_t channel, double samples) const noexcept {
@@ -148,6 +144,9 @@ double Regression::block_power(std::size_t channel, double samples) const noexce
 }
 
 bool Regression::checkpoint() noexcept {
+  part_gram_.end_part(static_cast<double>(part_start_) * drift_scale_,
+                      {totals_.data(), triangle(order())});
+  part_start_ = ticks_;
   ++parts_;
   if (kept_ == capacity_ && parts_ % stride_ == 0) {
     for (std::size_t i = 1; 2 * i < kept_; ++i) {
@@ -168,6 +167,8 @@ void Regression::forget() noexcept {
   kept_ = 1;
   stride_ = 1;
   parts_ = 0;
+  part_start_ = ticks_;
+  part_gram_.restart();
   std::copy_n(totals_.data(), width(), store_.data());
   samples_[0] = ticks_;
 }
@@ -187,6 +188,30 @@ void Regression::window(std::size_t channel, std::size_t first, std::size_t last
   for (std::size_t i = 0; i < rows; ++i) sums.moments[i] = moments_to[i] - moments_from[i];
   sums.square = moments_to[rows] - moments_from[rows];
   sums.count = moments_to[rows + 1] - moments_from[rows + 1];
+}
+
+void Regression::staircase(std::size_t channel, std::size_t first, std::size_t last,
+                           std::size_t origin, std::size_t step, Staircase& stairs) const noexcept {
+  const std::size_t rows = order();
+  std::fill_n(stairs.products.begin(), rows, 0.0);
+  stairs.square = 0.0;
+  stairs.moment = 0.0;
+  for (std::size_t begin = first; begin < last;) {
+    const std::size_t level = (begin - origin) / step;
+    const std::size_t end = std::min(last, origin + (level + 1) * step);
+    const double* from = kept(begin);
+    const double* to = kept(end);
+    const std::size_t own = gram_at(channel);
+    const auto height = static_cast<double>(level);
+    for (std::size_t row = 0; row < rows; ++row) {
+      const std::size_t at = triangle(row) + constant_row;
+      stairs.products[row] += height * ((to[at] - from[at]) + (to[own + at] - from[own + at]));
+    }
+    const std::size_t moments = moments_at(channel);
+    stairs.square += height * height * (to[moments + rows + 1] - from[moments + rows + 1]);
+    stairs.moment += height * (to[moments + constant_row] - from[moments + constant_row]);
+    begin = end;
+  }
 }
 
 }  // namespace sinerig

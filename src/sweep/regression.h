@@ -13,6 +13,7 @@
 
 #include "sweep/nonblocking.h"
 #include "sweep/normal_equations.h"
+#include "sweep/part_gram.h"
 #include "sweep/tone.h"
 
 namespace sinerig {
@@ -36,6 +37,15 @@ struct Coefficients {
   std::complex<double> phasor() const noexcept { return {b, a}; }
 };
 
+// What a staircase z has in common with the regressors and with the channel.
+struct Staircase {
+  std::vector<double> products;  // Σ z x of every regressor
+  double square = 0.0;           // Σ z²
+  double moment = 0.0;           // Σ z y
+
+  explicit Staircase(std::size_t max_order) : products(max_order) {}
+};
+
 class Regression {
  public:
   static constexpr std::size_t constant_row = 0;
@@ -43,13 +53,16 @@ class Regression {
   static constexpr std::size_t cosine_row(std::size_t bin) { return 2 + 2 * bin; }
   static constexpr std::size_t sine_row(std::size_t bin) { return 3 + 2 * bin; }
 
-  // Takes all memory: `checkpoints` is how many can be kept at once.
-  Regression(std::size_t channels, std::size_t max_bins, std::size_t checkpoints);
+  // Takes all memory: `checkpoints` is how many can be kept at once, `max_parts` in how many a
+  // block may be cut.
+  Regression(std::size_t channels, std::size_t max_bins, std::size_t checkpoints,
+             std::size_t max_parts);
 
   // Begins a dwell. `omega_rad_s` per bin; `period_s` of the tick; `drift_samples` the length in
-  // which the drift regressor moves by one.
-  void start(std::span<const double> omega_rad_s, double period_s,
-             double drift_samples) noexcept SINERIG_NONBLOCKING;
+  // which the drift regressor moves by one; `parts` in how many a block is cut, at whose ends
+  // checkpoint() is called, if all bins are whole cycles in a block, 0 if not.
+  void start(std::span<const double> omega_rad_s, double period_s, double drift_samples,
+             std::size_t parts) noexcept SINERIG_NONBLOCKING;
 
   // One tick: a phasor per bin, an observation per channel.
   void add(std::span<const Phasor> phasors,
@@ -76,15 +89,24 @@ class Regression {
   std::uint64_t samples_at(std::size_t checkpoint) const noexcept { return samples_[checkpoint]; }
   std::size_t order() const noexcept { return 2 + 2 * bins_; }
   std::size_t channels() const noexcept { return channels_; }
-  double reference(std::size_t channel) const noexcept { return references_[channel]; }
+  double reference(std::size_t channel) const noexcept { return states_[channel].reference; }
 
   // The sums of a channel between two checkpoints.
   void window(std::size_t channel, std::size_t first, std::size_t last,
               NormalSums& sums) const noexcept SINERIG_NONBLOCKING;
 
+  // The sums of a channel between two checkpoints with another regressor than the straight drift
+  // for its slope: a staircase that climbs by one every `step` checkpoints, counted from `origin`.
+  // Over whole blocks it is orthogonal to all that repeats in each block, harmonics that nobody
+  // models included; the slope of the means of the blocks is what it sees.
+  void staircase(std::size_t channel, std::size_t first, std::size_t last, std::size_t origin,
+                 std::size_t step, Staircase& stairs) const noexcept SINERIG_NONBLOCKING;
+
   // The offset that the channel's phase is referred to; its coefficients are to be turned by
   // e^{−jω·offset}.
-  std::int64_t common_offset_ns(std::size_t channel) const noexcept { return offsets_[channel]; }
+  std::int64_t common_offset_ns(std::size_t channel) const noexcept {
+    return states_[channel].offset_ns;
+  }
 
  private:
   // One row of totals: shared Gram, then per channel Gram correction, moments, square, count.
@@ -100,6 +122,15 @@ class Regression {
     return &store_[checkpoint * capacity_width_];
   }
 
+  struct ChannelState {
+    double reference = 0.0;      // its first value, which is subtracted
+    std::int64_t offset_ns = 0;  // of its first sample from the tick
+    bool seen = false;
+  };
+
+  void set_regressors(std::span<const Phasor> phasors, double drift) noexcept;
+  void correct(std::size_t channel, std::span<const Phasor> phasors, double drift,
+               std::int64_t off_grid_ns, bool missing) noexcept;
   void shift(std::span<const Phasor> phasors, double seconds) noexcept;
 
   std::size_t channels_;
@@ -111,9 +142,9 @@ class Regression {
   double drift_scale_ = 1.0;
   std::uint64_t ticks_ = 0;
   std::vector<double> omega_;
-  std::vector<double> references_;
-  std::vector<std::int64_t> offsets_;
-  std::vector<bool> seen_;
+  std::vector<ChannelState> states_;
+  PartGram part_gram_;
+  std::uint64_t part_start_ = 0;
   std::vector<double> totals_;
   std::vector<double> block_start_;  // moments and square of every channel when the block began
   std::vector<double> x_;

@@ -12,6 +12,9 @@ namespace {
 // A dwell that gaps keep from finishing is given up at this many times its planned length.
 constexpr std::uint64_t max_dwell_stretch = 4;
 
+// A slow loop that misses a few ticks has not lost its clock, however long that takes.
+constexpr std::uint64_t min_lost_ticks = 10;
+
 // The transient of a dwell's beginning is not to be taken for a wrong sign of a read-back.
 constexpr std::uint32_t blocks_before_check = 2;
 
@@ -99,6 +102,10 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const int stop_requests = control.stop_requests.load(std::memory_order_relaxed);
   if (stop_requests > 0) {
     guard_.stop(TripCause::stop_requested, tick.index, stop_requests > 1);
+  }
+  const double gap_s = static_cast<double>(ticks - 1) * clock_.grid().period_s();
+  if (gap_s > settings_.max_gap_s && ticks > min_lost_ticks) {
+    guard_.trip(TripCause::clock_lost, no_sensor, gap_s, settings_.max_gap_s, tick.index);
   }
   command_ = guard_.admit(excitation_.command(), tick.index, ticks);
   exchange(command_, tick);
@@ -304,7 +311,7 @@ Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept
   };
   if (guard_.trip().tripped()) {
     mark(PointStatus::stopped, PointReason::guard_trip, 0.0);
-  } else if (given_up_) {
+  } else if (given_up_ && timing_.resettles > 0) {
     mark(PointStatus::rt_fault, PointReason::gaps, timing_.resettles);
   } else if (!(excitation >= settings_.min_excitation)) {
     mark(PointStatus::low_signal, PointReason::no_excitation, excitation);
@@ -312,6 +319,8 @@ Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept
     const auto ticks = static_cast<double>(timing_.ticks);
     mark(PointStatus::clipped, PointReason::output_at_range,
          static_cast<double>(range_faults_[sensor]) / ticks);
+  } else if (given_up_) {
+    mark(PointStatus::rt_fault, PointReason::gaps, point.lost);
   }
   return point;
 }

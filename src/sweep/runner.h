@@ -31,6 +31,7 @@ struct RunnerSettings {
   bool record_samples = false;
   double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
   double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
+  double max_gap_s = 1.0;        // without a tick: the machine slept, nobody minded the actuator
 };
 
 struct RunOutcome {

@@ -41,32 +41,25 @@ CoherentFrequency snap(double frequency_hz, double rate_hz, double relative_tole
 }
 
 Phasor phasor(std::uint64_t index, std::uint64_t samples) noexcept {
-  // Eighths of a turn: 8·index = octant·samples + rest, by comparing, which beats a division.
+  // Eighths of a turn: 8·index = octant·samples + rest. By comparing, which beats a division, and
+  // without a branch: which octant comes next is nothing that a processor could guess.
   std::uint64_t rest = 8 * index;
   std::uint64_t octant = 0;
   for (const std::uint64_t step : {4U, 2U, 1U}) {
-    if (rest >= step * samples) {
-      rest -= step * samples;
-      octant += step;
-    }
+    const std::uint64_t in = rest >= step * samples ? 1 : 0;
+    rest -= in * step * samples;
+    octant += in * step;
   }
-  const bool odd = (octant & 1) != 0;
-  const std::uint64_t folded = odd ? samples - rest : rest;
+  const std::uint64_t folded = (octant & 1) != 0 ? samples - rest : rest;
   const double angle =
       std::numbers::pi / 4.0 * (static_cast<double>(folded) / static_cast<double>(samples));
-  const double cosine = std::cos(angle);
+  const double near_axis = std::cos(angle);
   // At 45° the two differ by a rounding; one value keeps the symmetry.
-  const double sine = folded == samples ? cosine : std::sin(angle);
-  switch (octant) {
-    case 0: return {cosine, sine};
-    case 1: return {sine, cosine};
-    case 2: return {-sine, cosine};
-    case 3: return {-cosine, sine};
-    case 4: return {-cosine, -sine};
-    case 5: return {-sine, -cosine};
-    case 6: return {sine, -cosine};
-    default: return {cosine, -sine};
-  }
+  const double off_axis = folded == samples ? near_axis : std::sin(angle);
+  const bool upright = ((octant + 1) & 2) != 0;  // octants 1, 2, 5, 6 are about the axis of sines
+  const double cosine = upright ? off_axis : near_axis;
+  const double sine = upright ? near_axis : off_axis;
+  return {((octant + 2) & 4) != 0 ? -cosine : cosine, (octant & 4) != 0 ? -sine : sine};
 }
 
 }  // namespace sinerig

@@ -183,11 +183,25 @@ TEST(Gaps, WithoutAnEndMakeARealTimeFaultAndReleaseTheActuator) {
   EXPECT_EQ(run.last_command, 0.0);
 }
 
-TEST(Gaps, OfWholeDwellsEndTheRunAsWell) {
+TEST(Gaps, NearlyAsLongAsIsAllowedEndTheRunAsWell) {
   const SweepPlan plan = plan_of({10.0});
-  const auto run = run_with_gaps(plan, [](std::uint64_t) -> std::uint64_t { return 5000; });
+  const auto run = run_with_gaps(plan, [](std::uint64_t) -> std::uint64_t { return 1000; });
+  EXPECT_FALSE(run.outcome.trip.tripped());
   EXPECT_EQ(run.sink.points.at(0).status, PointStatus::rt_fault);
   EXPECT_TRUE(run.released);
+}
+
+TEST(Gaps, InWhichTheMachineSleptStopTheRun) {
+  const SweepPlan plan = plan_of({10.0, 20.0});
+  const auto run = run_with_gaps(
+      plan, [](std::uint64_t index) -> std::uint64_t { return index == 400 ? 1001 : 0; });
+  EXPECT_EQ(run.outcome.trip.cause, TripCause::clock_lost);
+  EXPECT_EQ(run.outcome.trip.tick, 1401U);
+  EXPECT_NEAR(run.outcome.trip.value, 1.001, 1e-12);
+  EXPECT_EQ(describe(run.outcome.trip, {}),
+            "the loop stood still for 1 s (at most 1 s) (tick 1401; command changed to 0)");
+  EXPECT_TRUE(run.released);
+  EXPECT_EQ(run.last_command, 0.0);
 }
 
 }  // namespace

@@ -47,8 +47,8 @@ struct Outcome {
 Outcome measure(const Signal& signal, const Faults& faults, std::uint64_t seed) {
   std::mt19937_64 generator{seed};
   std::uniform_real_distribution<double> uniform;
-  Regression regression{2, 1, 33};
-  regression.start(std::span{&omega, 1}, 1.0 / rate_hz, 250.0);
+  Regression regression{2, 1, 33, 1};
+  regression.start(std::span{&omega, 1}, 1.0 / rate_hz, 250.0, 1);
   PhaseCounter phase{tone.cycles, tone.samples};
   Outcome outcome;
   double last = 0.0;
@@ -119,8 +119,8 @@ TEST(Regression, TakesOutTheAgeOfTheSamples) {
 
 TEST(Regression, MergesCheckpointsWithoutLosingTheWindow) {
   const Signal signal;
-  Regression few{2, 1, 5};
-  few.start(std::span{&omega, 1}, 1.0 / rate_hz, 250.0);
+  Regression few{2, 1, 5, 1};
+  few.start(std::span{&omega, 1}, 1.0 / rate_hz, 250.0, 1);
   PhaseCounter phase{tone.cycles, tone.samples};
   for (int n = 0; n < 32 * 250; ++n) {
     const Phasor phasor = phase.phasor();

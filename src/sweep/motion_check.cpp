@@ -1,0 +1,122 @@
+#include "sweep/motion_check.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "sweep/multitone.h"
+
+namespace sinerig {
+
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return text;
+}
+
+double sine_slew(double amplitude, double frequency_hz, double rate_hz) {
+  return 2.0 * amplitude * std::sin(two_pi * frequency_hz / rate_hz / 2.0) * rate_hz;
+}
+
+// What a dwell asks of the rig at most.
+struct Motion {
+  double amplitude = 0.0;
+  double slew_per_s = 0.0;
+  double velocity = 0.0;
+  double acceleration = 0.0;
+};
+
+Motion motion_of(const Dwell& dwell, double rate_hz) {
+  const Tone& tone = dwell.tones.front();
+  const double omega_rad_s = two_pi * dwell.frequency_hz(rate_hz);
+  if (dwell.tones.size() == 1) {
+    return {.amplitude = tone.amplitude,
+            .slew_per_s = sine_slew(tone.amplitude, dwell.frequency_hz(rate_hz), rate_hz),
+            .velocity = tone.amplitude * omega_rad_s,
+            .acceleration = tone.amplitude * omega_rad_s * omega_rad_s};
+  }
+  CommonBlock block{.samples = dwell.block_samples, .cycles = {}};
+  std::vector<double> amplitudes;
+  std::vector<double> phases_rad;
+  for (const Tone& each : dwell.tones) {
+    block.cycles.push_back(each.cycles);
+    amplitudes.push_back(each.amplitude);
+    phases_rad.push_back(each.phase_rad);
+  }
+  const TonePeaks peaks = peaks_of(block, amplitudes, phases_rad, rate_hz);
+  return {.amplitude = peaks.value,
+          .slew_per_s = peaks.per_s,
+          .velocity = peaks.per_s,
+          .acceleration = peaks.per_s2};
+}
+
+}  // namespace
+
+void check_motion(const SweepSettings& sweep, const MotionLimits& limits, const Dwell& dwell,
+                  double rate_hz) {
+  const Motion motion = motion_of(dwell, rate_hz);
+  const char* amplitude_key = sweep.amplitude_table.empty() ? "amplitude" : "amplitude_table";
+  const auto refuse = [&](const char* what, double value, const char* limit_key, double limit) {
+    throw PlanRefused("sweep", amplitude_key,
+                      std::string{what} + " of " + number(value) + " at " +
+                          number(dwell.frequency_hz(rate_hz)) + " Hz: exceeds [limits] " +
+                          limit_key + " = " + number(limit) +
+                          "; lower the amplitude there or raise the limit");
+  };
+  const double baseline = sweep.neutral + sweep.offset;
+  const double reach = motion.amplitude + sweep.bias_amplitude;
+  if (baseline + reach > limits.command_max) {
+    refuse("a command", baseline + reach, "command_max", limits.command_max);
+  }
+  if (baseline - reach < limits.command_min) {
+    refuse("a command", baseline - reach, "command_min", limits.command_min);
+  }
+  if (motion.slew_per_s > limits.slew_per_s) {
+    refuse("a slew", motion.slew_per_s, "slew_per_s", limits.slew_per_s);
+  }
+  if (motion.velocity > limits.velocity_max) {
+    refuse("a peak velocity", motion.velocity, "velocity_max", limits.velocity_max);
+  }
+  if (motion.acceleration > limits.acceleration_max) {
+    refuse("a peak acceleration", motion.acceleration, "acceleration_max", limits.acceleration_max);
+  }
+}
+
+void check_baseline(const Baseline& baseline, const MotionLimits& limits, double rate_hz) {
+  const double ramp_ticks = std::max(1.0, static_cast<double>(baseline.ramp_samples));
+  const double slew_per_s = std::abs(baseline.offset) / ramp_ticks * rate_hz;
+  if (slew_per_s <= limits.slew_per_s) return;
+  throw PlanRefused("sweep", "offset",
+                    "a slew of " + number(slew_per_s) +
+                        " on the way from neutral: exceeds [limits] slew_per_s = " +
+                        number(limits.slew_per_s) + "; give it a longer ramp_s");
+}
+
+// A dwell may begin anywhere in the cycle: a change of amplitude needs half a cycle at least, or
+// the command would jump. The envelope adds to the slew of the sine, change / ramp per tick, or
+// change · ω from rest where the ramp is shorter than the sine takes to get there.
+void check_ramp(const Dwell& dwell, double amplitude_before, const MotionLimits& limits,
+                double rate_hz) {
+  const double amplitude = dwell.tones.front().amplitude;
+  if (dwell.tones.size() > 1 || dwell.ramp_samples == 0 || amplitude == amplitude_before) return;
+  const double frequency_hz = dwell.frequency_hz(rate_hz);
+  const double slew_per_s =
+      sine_slew(std::max(amplitude, amplitude_before), frequency_hz, rate_hz) +
+      std::abs(amplitude - amplitude_before) *
+          std::min(rate_hz / static_cast<double>(dwell.ramp_samples), two_pi * frequency_hz);
+  if (slew_per_s <= limits.slew_per_s) return;
+  throw PlanRefused("sweep", "ramp_s",
+                    "a slew of up to " + number(slew_per_s) + " on the ramp to " +
+                        number(frequency_hz) +
+                        " Hz: exceeds [limits] slew_per_s = " + number(limits.slew_per_s) +
+                        "; lengthen the ramp, lower the amplitude there or raise the limit");
+}
+
+}  // namespace sinerig
