@@ -2,6 +2,8 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 #include <string>
 
@@ -224,6 +226,27 @@ TEST_F(FitCommand, RefusesOptionsThatMakeNoSense) {
   const auto absent = workshop_.sinerig("fit nowhere.csv");
   EXPECT_EQ(absent.exit_code, 2);
   EXPECT_THAT(absent.errors, HasSubstr("nowhere.csv: cannot be read"));
+}
+
+TEST_F(FitCommand, ChoeTakesTheSubBandsThatTheSweepPlanned) {
+  std::ifstream file{SINERIG_SOURCE_DIR "/config/chebyshev.toml"};
+  std::string rig{std::istreambuf_iterator<char>{file}, {}};
+  const std::size_t points = rig.find("\npoints = ");
+  ASSERT_NE(points, std::string::npos);
+  rig.replace(points, rig.find('\n', points + 1) - points, "\npoints = 12\nsub_bands = 4");
+  workshop_.write("bands.toml", rig);
+  const auto plan = workshop_.sinerig("plan bands.toml");
+  EXPECT_THAT(plan.output, HasSubstr("sub-band 4: points 35 to 45"));
+  ASSERT_EQ(workshop_.sinerig("run bands.toml --no-report").exit_code, 0);
+  const std::string command = "fit bands.sweep --method choe --zeros 0 --poles 3 --json ";
+  const auto run = workshop_.sinerig(command);
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json bands = json::parse(run.output)["choe"]["bands"];
+  ASSERT_EQ(bands.size(), 4U);
+  EXPECT_EQ(bands[0]["points"].get<int>(), 12);
+  EXPECT_EQ(bands[3]["points"].get<int>(), 11);
+  EXPECT_EQ(json::parse(workshop_.sinerig(command + "--bands 2").output)["choe"]["bands"].size(),
+            2U);
 }
 
 }  // namespace
