@@ -139,6 +139,9 @@ SweepSettings read_sweep(const Section& section, double rate_hz) {
   sweep.tones_tolerance =
       section.number("tones_tolerance", {.min = 1e-6, .max = 0.2}, sweep.tones_tolerance);
   sweep.odd_bins = section.flag("odd_bins", sweep.odd_bins);
+  sweep.refine_points = static_cast<std::uint32_t>(
+      section.integer("refine_points", {.min = 0.0, .max = 10'000.0}, sweep.refine_points));
+  sweep.refine_db = section.number("refine_db", {.min = 0.001, .max = 60.0}, sweep.refine_db);
   read_amplitude(section, sweep);
   sweep.level = read_level(section);
   sweep.offset = section.number("offset", any_number, sweep.offset);

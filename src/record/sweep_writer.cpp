@@ -101,7 +101,8 @@ SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists 
     channel.bind(i, info.channels[i].name, info.channels[i].unit).run();
     if (i >= first_sensor_channel) sensor_names_.push_back(info.channels[i].name);
   }
-  write_plan(info.plan);
+  for (std::size_t i = 0; i < info.plan.dwells.size(); ++i) write_dwell(i, info.plan.dwells[i]);
+  candidates_ = info.plan.refinement.candidates;
   commit();
 }
 
@@ -134,19 +135,16 @@ void SweepWriter::set(const std::string& key, const std::string& value) {
   statements_->run.bind(key, value).run();
 }
 
-void SweepWriter::write_plan(const SweepPlan& plan) {
+void SweepWriter::write_dwell(std::size_t index, const Dwell& dwell) {
   Statement insert_dwell{database_, "INSERT INTO dwell VALUES (?, ?, ?, ?, ?, ?, ?, ?)"};
   Statement insert_tone{database_, "INSERT INTO tone VALUES (?, ?, ?, ?, ?)"};
-  for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
-    const Dwell& dwell = plan.dwells[i];
-    insert_dwell
-        .bind(i, dwell.asked_hz, dwell.block_samples, dwell.ramp_samples, dwell.settle_samples,
-              dwell.blocks, dwell.max_samples, dwell.sub_band)
-        .run();
-    for (std::size_t k = 0; k < dwell.tones.size(); ++k) {
-      const Tone& tone = dwell.tones[k];
-      insert_tone.bind(i, k, tone.cycles, tone.amplitude, tone.phase_rad).run();
-    }
+  insert_dwell
+      .bind(index, dwell.asked_hz, dwell.block_samples, dwell.ramp_samples, dwell.settle_samples,
+            dwell.blocks, dwell.max_samples, dwell.sub_band)
+      .run();
+  for (std::size_t k = 0; k < dwell.tones.size(); ++k) {
+    const Tone& tone = dwell.tones[k];
+    insert_tone.bind(index, k, tone.cycles, tone.amplitude, tone.phase_rad).run();
   }
 }
 
@@ -183,6 +181,7 @@ void SweepWriter::insert(const DwellTiming& timing) {
 }
 
 void SweepWriter::insert(const Event& event) {
+  if (event.kind == EventKind::refined) write_dwell(event.dwell, candidates_.at(event.candidate));
   const std::string detail =
       event.kind == EventKind::tripped ? describe(event.trip, sensor_names_) : "";
   statements_->event

@@ -55,7 +55,7 @@ class SweepWriter {
   struct Statements;
 
   void begin();
-  void write_plan(const SweepPlan& plan);
+  void write_dwell(std::size_t index, const Dwell& dwell);
   void insert(const Point& point);
   void insert(const Block& block);
   void insert(const DwellTiming& timing);
@@ -64,6 +64,7 @@ class SweepWriter {
 
   std::string path_;
   std::vector<std::string> sensor_names_;
+  std::vector<Dwell> candidates_;  // of the plan's refinement
   Database database_;
   std::unique_ptr<Statements> statements_;
   bool in_transaction_ = false;

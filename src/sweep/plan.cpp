@@ -17,6 +17,14 @@ constexpr double two_pi = 2.0 * std::numbers::pi;
 // A dwell longer than this is a mistake in the rig file, not a measurement: 30 days at 1 kHz.
 constexpr double max_dwell_samples = 2.6e9;
 
+// A gap of the first pass is divided into this many for refinement, fewer where all gaps together
+// would have more candidates.
+constexpr std::size_t finest_pieces = 64;
+constexpr std::size_t most_candidates = 20'000;
+
+// A candidate may follow any dwell: it always has the ramp of a change.
+const Dwell any_dwell{.tones = {{}, {}}};
+
 std::string number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", value);
@@ -106,7 +114,7 @@ Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Ton
     return tones.size() == 1 && other.tones.size() == 1 &&
            other.tones.front().amplitude == tones.front().amplitude;
   };
-  const bool changes = before != nullptr ? !same_amplitude(*before) : tones.size() > 1;
+  const bool changes = before == nullptr ? tones.size() > 1 : !same_amplitude(*before);
   const double ramp_samples =
       std::ceil(std::max(sweep.ramp_s * rate_hz, changes ? samples_per_cycle / 2.0 : 0.0) - 1e-9);
   // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
@@ -216,6 +224,44 @@ bool same_frequency(const Dwell& a, const Dwell& b) {
   return a.tones.front().cycles * b.block_samples == b.tones.front().cycles * a.block_samples;
 }
 
+Refinement make_refinement(const SweepPlan& plan, const SweepSettings& sweep,
+                           const MotionLimits& limits) {
+  std::vector<double> measured_hz;
+  for (const Dwell& dwell : plan.dwells) {
+    for (const Tone& tone : dwell.tones) measured_hz.push_back(dwell.tone_hz(tone, plan.rate_hz));
+  }
+  std::sort(measured_hz.begin(), measured_hz.end());
+  Refinement refinement{
+      .candidates = {}, .most_points = sweep.refine_points, .tolerance_db = sweep.refine_db};
+  const std::size_t gaps = measured_hz.size() - 1;
+  std::size_t pieces = finest_pieces;
+  while (pieces > 2 && gaps * (pieces - 1) > most_candidates) pieces /= 2;
+  double last_hz = 0.0;
+  for (std::size_t gap = 0; gap < gaps; ++gap) {
+    const double ratio = measured_hz[gap + 1] / measured_hz[gap];
+    for (std::size_t i = 1; i < pieces; ++i) {
+      const double asked_hz =
+          measured_hz[gap] * std::pow(ratio, static_cast<double>(i) / static_cast<double>(pieces));
+      Dwell dwell = make_single(asked_hz, sweep, plan.rate_hz, &any_dwell);
+      const double exact_hz = dwell.frequency_hz(plan.rate_hz);
+      if (exact_hz <= last_hz || exact_hz <= measured_hz[gap] || exact_hz >= measured_hz[gap + 1]) {
+        continue;
+      }
+      // What the limits do not allow is no candidate: the first pass has been checked.
+      try {
+        check_motion(sweep, limits, dwell, plan.rate_hz);
+        check_ramp(dwell, 0.0, limits, plan.rate_hz);
+      } catch (const PlanRefused&) {
+        continue;
+      }
+      if (plan.baseline.oscillates()) dwell.bias_hz = plan.baseline.oscillation.hz(plan.rate_hz);
+      last_hz = exact_hz;
+      refinement.candidates.push_back(std::move(dwell));
+    }
+  }
+  return refinement;
+}
+
 }  // namespace
 
 std::uint64_t SweepPlan::min_samples() const {
@@ -268,6 +314,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
     check_ramp(dwell, before == nullptr ? 0.0 : before->tones.front().amplitude, limits, rate_hz);
     plan.dwells.push_back(std::move(dwell));
   }
+  if (sweep.refine_points > 0) plan.refinement = make_refinement(plan, sweep, limits);
   return plan;
 }
 

@@ -59,6 +59,8 @@ struct SweepSettings {
   std::vector<double> frequencies_hz;  // for Spacing::list, in the order to be run
   double frequency_tolerance = 1e-3;   // relative, for the snap to whole cycles in whole samples
   std::uint32_t tones = 1;             // in one dwell, at most
+  std::uint32_t refine_points = 0;     // added where the response is not known; 0 = none
+  double refine_db = 0.5;              // known: two local models agree between points within this
   double tones_tolerance = 0.03;       // relative, of the tones above the lowest of a dwell
   bool odd_bins = false;               // every tone an odd number of cycles in the block
 
@@ -150,11 +152,20 @@ struct Judgement {
   bool has_target() const { return target_db > 0.0 || target_deg > 0.0; }
 };
 
+// What may be measured after the first pass, where the response between two points is not known.
+// The candidates divide every gap evenly; all are checked against the limits before anything moves.
+struct Refinement {
+  std::vector<Dwell> candidates;
+  std::uint32_t most_points = 0;
+  double tolerance_db = 0.5;
+};
+
 struct SweepPlan {
   double rate_hz = 0.0;
   Baseline baseline{};
   Level level{};
   std::vector<Dwell> dwells;
+  Refinement refinement{};
   Judgement judgement{};
 
   std::uint64_t min_samples() const;

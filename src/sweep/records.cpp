@@ -37,6 +37,7 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::started: return "started";
     case EventKind::dwell_began: return "dwell_began";
     case EventKind::retried: return "retried";
+    case EventKind::refined: return "refined";
     case EventKind::gap: return "gap";
     case EventKind::actuator_fault: return "actuator_fault";
     case EventKind::sensor_fault: return "sensor_fault";

@@ -104,6 +104,7 @@ enum class EventKind : std::uint8_t {
   started,
   dwell_began,
   retried,         // value: amplitude of the next try
+  refined,         // a dwell was added; value: disagreement that called for it, dB; candidate
   gap,             // value: ticks skipped
   actuator_fault,  // detail: Fault
   sensor_fault,    // channel, detail: Fault; the first of a run of them
@@ -122,6 +123,7 @@ struct Event {
   std::uint32_t dwell = 0;
   std::uint64_t tick = 0;
   double value = 0.0;
+  std::uint32_t candidate = 0;  // of the plan's refinement
   Trip trip{};
 };
 

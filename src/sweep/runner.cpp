@@ -27,7 +27,23 @@ std::size_t most_tones(const SweepPlan& plan) {
 std::size_t most_bins(const SweepPlan& plan) {
   std::size_t most = 1;
   for (const Dwell& dwell : plan.dwells) most = std::max(most, dwell.bins());
+  for (const Dwell& dwell : plan.refinement.candidates) most = std::max(most, dwell.bins());
   return most;
+}
+
+// With room for those that refinement adds.
+std::vector<const Dwell*> dwells_of(const SweepPlan& plan) {
+  std::vector<const Dwell*> dwells;
+  dwells.reserve(plan.dwells.size() + plan.refinement.most_points);
+  for (const Dwell& dwell : plan.dwells) dwells.push_back(&dwell);
+  return dwells;
+}
+
+std::size_t most_points(const SweepPlan& plan) {
+  if (plan.refinement.most_points == 0) return 0;
+  std::size_t points = plan.refinement.most_points;
+  for (const Dwell& dwell : plan.dwells) points += dwell.tones.size();
+  return points;
 }
 
 Pairs responses_of(const RunnerSettings& settings, std::size_t sensors) {
@@ -59,6 +75,9 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       sensors_{sensors.begin(), sensors.end()},
       guard_{guard},
       sink_{sink},
+      dwells_{dwells_of(plan_)},
+      refiner_{plan_.refinement, plan_.rate_hz, most_points(plan_),
+               responses_of(settings_, sensors.size()).size()},
       excitation_{most_tones(plan_), most_bins(plan_), plan_.baseline},
       leveller_{plan_.level},
       measurement_{1 + sensors.size(), most_bins(plan_),
@@ -92,7 +111,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool first = outcome_.ticks == 0;
   const std::uint64_t ticks = first ? 1 : tick.index - last_tick_;
 
-  const bool closing = dwell_ == plan_.dwells.size();
+  const bool closing = dwell_ == dwells_.size();
   const bool new_dwell = !closing && dwell_ticks_ == 0;
   if (new_dwell) begin_dwell(first ? 0 : last_tick_ + 1);
   excitation_.advance(new_dwell ? ticks - 1 : ticks);
@@ -125,7 +144,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
   measure(tick.index, ticks > 1 || late || command_lost_);
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
-  if (dwell_ < plan_.dwells.size()) return true;
+  if (dwell_ < dwells_.size()) return true;
   excitation_.close();
   return !excitation_.closed();
 }
@@ -186,7 +205,7 @@ void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
 // A late or lost command has disturbed the plant: what was gathered is void, wait again. A lost
 // sensor sample has not: it leaves the regression.
 void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
-  const Dwell& dwell = plan_.dwells[dwell_];
+  const Dwell& dwell = *dwells_[dwell_];
   if (disturbed) {
     ++timing_.resettles;
     settle_left_ = std::max(settle_left_, dwell.settle_samples);
@@ -208,10 +227,25 @@ void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
   attempt_ = 0;
   ++dwell_;
   ++outcome_.dwells_done;
+  if (dwell_ == dwells_.size()) refine();
+}
+
+// One more dwell where the response between two points is not known.
+void SweepRunner::refine() noexcept {
+  if (dwells_.size() == plan_.dwells.size() + plan_.refinement.most_points) return;
+  const double disagreement_db = refiner_.worst_db();
+  const std::optional<std::size_t> candidate = refiner_.next();
+  if (!candidate) return;
+  dwells_.push_back(&plan_.refinement.candidates[*candidate]);  // within what was reserved
+  announce({.kind = EventKind::refined,
+            .dwell = dwell_,
+            .tick = last_tick_,
+            .value = disagreement_db,
+            .candidate = static_cast<std::uint32_t>(*candidate)});
 }
 
 bool SweepRunner::try_again() noexcept {
-  const double planned = plan_.dwells[dwell_].tones.front().amplitude;
+  const double planned = dwells_[dwell_]->tones.front().amplitude;
   const std::optional<double> scale = leveller_.retry(make_point(0, 0), scale_, planned);
   if (!scale) return false;
   announce(
@@ -224,7 +258,7 @@ bool SweepRunner::try_again() noexcept {
 }
 
 void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
-  const Dwell& dwell = plan_.dwells[dwell_];
+  const Dwell& dwell = *dwells_[dwell_];
   if (attempt_ == 0) {
     scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
   }
@@ -239,7 +273,7 @@ void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
 }
 
 void SweepRunner::put_block(std::uint64_t tick) noexcept {
-  const Dwell& dwell = plan_.dwells[dwell_];
+  const Dwell& dwell = *dwells_[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
     for (std::size_t channel = 0; channel < observations_.size(); ++channel) {
       sink_.put(Block{.dwell = dwell_,
@@ -263,7 +297,7 @@ void SweepRunner::check_excitation(std::uint64_t tick) noexcept {
     guard_.trip(causes[static_cast<std::size_t>(verdict.fault)], sensor, verdict.value,
                 verdict.limit, tick);
   };
-  const std::size_t tones = plan_.dwells[dwell_].tones.size();
+  const std::size_t tones = dwells_[dwell_]->tones.size();
   for (std::size_t tone = 0; tone < tones; ++tone) {
     refuse(check_applied(measurement_.block_coefficients(0, tone).phasor(),
                          excitation_.commanded(tone), settings_.min_excitation),
@@ -283,11 +317,17 @@ void SweepRunner::check_excitation(std::uint64_t tick) noexcept {
 }
 
 void SweepRunner::finish_dwell() noexcept {
-  const Dwell& dwell = plan_.dwells[dwell_];
+  const Dwell& dwell = *dwells_[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
+    const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
     for (std::size_t pair = 0; pair < measurement_.pairs().size(); ++pair) {
-      sink_.put(make_point(pair, tone));
+      const Point point = make_point(pair, tone);
+      sink_.put(point);
+      if (refining && point.status == PointStatus::good) {
+        refiner_.set(pair, point.response, point.covariance.mean_variance());
+      }
     }
+    if (refining) refiner_.learn();
   }
   sink_.put(timing_);
   outcome_.skipped_ticks += timing_.skipped;
@@ -295,7 +335,7 @@ void SweepRunner::finish_dwell() noexcept {
 }
 
 Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept {
-  const Dwell& dwell = plan_.dwells[dwell_];
+  const Dwell& dwell = *dwells_[dwell_];
   Point point = measurement_.point(pair, tone);
   point.dwell = dwell_;
   point.seconds = static_cast<double>(dwell_ticks_) / plan_.rate_hz;

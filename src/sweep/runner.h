@@ -15,6 +15,7 @@
 #include "sweep/measurement.h"
 #include "sweep/plan.h"
 #include "sweep/records.h"
+#include "sweep/refiner.h"
 
 namespace sinerig {
 
@@ -61,6 +62,7 @@ class SweepRunner {
   void check_excitation(std::uint64_t tick) noexcept;
   bool try_again() noexcept;
   void finish_dwell() noexcept;
+  void refine() noexcept;
   Point make_point(std::size_t pair, std::size_t tone) const noexcept;
   void account(const Tick& tick, std::uint64_t ticks) noexcept;
   void note_sensor(std::size_t sensor, const Sample& sample, std::uint64_t tick) noexcept;
@@ -74,6 +76,8 @@ class SweepRunner {
   Guard& guard_;
   RecordSink& sink_;
 
+  std::vector<const Dwell*> dwells_;  // of the plan, then those added
+  Refiner refiner_;
   Excitation excitation_;
   Leveller leveller_;
   Measurement measurement_;
