@@ -12,6 +12,7 @@
 #include "cli/file_arguments.h"
 #include "cli/fit_command.h"
 #include "cli/fit_input.h"
+#include "cli/fit_options.h"
 #include "cli/loop_arguments.h"
 #include "cli/margins_command.h"
 #include "cli/notch_command.h"
@@ -42,47 +43,6 @@ constexpr const char* footer =
     "Exit codes: 0 done, 1 failed, 2 usage or configuration, 3 stopped by a limit or a fault,\n"
     "4 interrupted, 5 compare found a change. Every key of a rig file is explained in the files of "
     "config/.";
-
-CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
-  CLI::App* fit = app.add_subcommand(
-      "fit",
-      "Identify a transfer function with delay from sweep files or CSV (freq_hz,re,im[,std])");
-  fit->add_option("FILE", options.files, "sweep or CSV files; several are fitted jointly")
-      ->required();
-  fit->add_option("--method", options.method,
-                  "ml: maximum likelihood; hassul, choe: the methods of the papers")
-      ->check(CLI::IsMember({"ml", "hassul", "choe"}))
-      ->capture_default_str();
-  fit->add_option("--zeros", options.zeros, "zeros, those at the origin included");
-  fit->add_option("--poles", options.poles, "poles, those at the origin included");
-  fit->add_option("--origin", options.origin, "poles at the origin; negative: zeros there");
-  fit->add_option("--order", options.order,
-                  "auto: choose the parts of the order that are not given (default without them)")
-      ->check(CLI::IsMember({"auto"}));
-  fit->add_option("--delay", options.delay, "none, fit, or a known delay in seconds")
-      ->capture_default_str();
-  fit->add_option("--hold", options.hold,
-                  "zero-order hold that drove the plant: auto (the loop of a sweep file), none, or "
-                  "its rate in Hz")
-      ->capture_default_str();
-  fit->add_option("--path-delay", options.path_delay_s,
-                  "delay of the measuring path in seconds, not part of the model");
-  fit->add_option("--static-gain", options.static_gain, "known gain of s^origin G(s) at s = 0");
-  fit->add_option("--given-pole", options.given_poles_rad_s, "a known real pole in rad/s");
-  fit->add_option("--model-error", options.model_error,
-                  "relative error of the model itself, added to the scatter (default: 0 for CSV, "
-                  "0.002 for sweep files)");
-  fit->add_option("--weights", options.weights, "hassul: none, 1/w, or W1,W2,... one per point")
-      ->capture_default_str();
-  fit->add_option("--bands", options.bands, "choe: number of sub-bands")->capture_default_str();
-  fit->add_flag("--stable", options.stable, "keep poles in the left half plane");
-  fit->add_flag("--minimum-phase", options.minimum_phase, "keep zeros in the left half plane");
-  fit->add_flag("--keep-outliers", options.keep_outliers, "never leave a point out");
-  fit->add_option("--channel", options.channel, "sensor of a sweep file (default: the first)");
-  fit->add_flag("--json", options.json, "print one JSON object");
-  fit->add_flag("--no-store", options.no_store, "do not store the fit in the sweep file");
-  return fit;
-}
 
 CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
   CLI::App* margins = app.add_subcommand(

@@ -1,8 +1,5 @@
 #include "cli/plant_model.h"
 
-#include <algorithm>
-#include <cmath>
-#include <memory>
 #include <numbers>
 #include <optional>
 
@@ -45,12 +42,18 @@ void read_json(const Json& json, PlantModel& model) {
     each.pole = complex_of(mode.at("pole"));
     model.modes.push_back(each);
   }
-  for (const Json& point : json.at("response"))
-    model.band.push_back({2.0 * std::numbers::pi * point.at("freq_hz").get<double>(),
-                          {point.at("re").get<double>(), point.at("im").get<double>()},
-                          number_or_zero(point.at("var_re")),
-                          number_or_zero(point.at("cov_re_im")),
-                          number_or_zero(point.at("var_im"))});
+  const Json& stored = json.at("root_covariance");
+  model.root_covariance.reference_rad_s =
+      2.0 * std::numbers::pi * stored.at("reference_hz").get<double>();
+  const Json& rows = stored.at("matrix");
+  const auto size = static_cast<Eigen::Index>(rows.size());
+  model.root_covariance.covariance.resize(size, size);
+  for (Eigen::Index i = 0; i < size; ++i)
+    for (Eigen::Index k = 0; k < size; ++k)
+      model.root_covariance.covariance(i, k) =
+          number_or_zero(rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(k)));
+  if (size != identify::coordinates_of(model.zpk))
+    throw InputError("the covariance does not belong to the roots");
 }
 
 std::string fitted(const std::string& file, const std::string& channel) {
@@ -58,8 +61,7 @@ std::string fitted(const std::string& file, const std::string& channel) {
   options.files = {file};
   options.channel = channel;
   const report::FitReport report = fit_files(options);
-  if (report.fit && !report.fit->converged)
-    spdlog::warn("the fit has not converged: {}", report.fit->reason);
+  if (!report.fit.converged) spdlog::warn("the fit has not converged: {}", report.fit.reason);
   return report::fit_json(report);
 }
 
@@ -78,34 +80,15 @@ PlantModel read_plant_model(const std::string& file, const std::string& channel,
   const Json parsed = Json::parse(*json, nullptr, false);
   try {
     read_json(parsed, model);
-  } catch (const Json::exception&) {
+  } catch (const std::exception&) {
     throw InputError(file + ": its stored fit lacks what is needed; make a new one with --refit");
   }
   return model;
 }
 
 identify::Curve::Scatter PlantModel::scatter() const {
-  struct Band {
-    std::vector<double> ln_omega;
-    std::vector<LogScatter> scatter;
-  };
-  const auto known = std::make_shared<Band>();
-  for (const identify::ResponsePoint& point : band) {
-    known->ln_omega.push_back(std::log(point.omega_rad_s));
-    known->scatter.push_back(identify::log_scatter(point));
-  }
-  return [known](double omega) {
-    const std::vector<double>& x = known->ln_omega;
-    if (x.empty()) return LogScatter{};
-    const double at = std::clamp(std::log(omega), x.front(), x.back());
-    const auto right = std::upper_bound(x.begin(), x.end() - 1, at);
-    const auto i = static_cast<std::size_t>(std::max(right - x.begin(), std::ptrdiff_t{1}));
-    if (i >= x.size()) return known->scatter.back();
-    const LogScatter& a = known->scatter[i - 1];
-    const LogScatter& b = known->scatter[i];
-    const double t = (at - x[i - 1]) / (x[i] - x[i - 1]);
-    return LogScatter{std::lerp(a.gain, b.gain, t), std::lerp(a.both, b.both, t),
-                      std::lerp(a.phase, b.phase, t)};
+  return [zpk = zpk, covariance = root_covariance](double omega_rad_s) {
+    return identify::log_scatter(identify::response_with_covariance(zpk, covariance, omega_rad_s));
   };
 }
 

@@ -14,10 +14,10 @@ namespace sinerig::cli {
 struct PlantModel {
   FitInput measured;
   identify::ZerosPolesGain zpk;
-  std::vector<identify::Mode> modes;  // frequency, damping and pole only
-  identify::Response band;            // G(jω) of the model with its covariance, where measured
+  std::vector<identify::Mode> modes;         // frequency, damping and pole only
+  identify::RootCovariance root_covariance;  // of zpk
 
-  // Relative scatter of G, straight over ln ω between the frequencies of the band, held beyond.
+  // Relative scatter of G at any frequency.
   identify::Curve::Scatter scatter() const;
 };
 

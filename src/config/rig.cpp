@@ -47,6 +47,25 @@ double read_frequency(const Section& sweep, std::string_view key, double rate_hz
   return frequency_hz;
 }
 
+constexpr Range point_count{.min = 1, .max = 100'000};
+
+void read_sub_band_table(const Section& section, double rate_hz, SweepSettings& sweep) {
+  for (const auto& row : section.rows("sub_band_table", above_zero)) {
+    if (row.size() != 3)
+      section.refuse("sub_band_table", "each row must be [start_hz, stop_hz, points]");
+    if (!below_half(rate_hz).contains(row[0]) || !below_half(rate_hz).contains(row[1]))
+      section.refuse("sub_band_table", "frequencies must be below half the loop rate");
+    if (!point_count.contains(row[2]) || row[2] != std::floor(row[2]))
+      section.refuse("sub_band_table", "points must be a whole number, 1 to 100000");
+    if (row[2] > 1.0 && row[0] == row[1])
+      section.refuse("sub_band_table",
+                     "stop_hz must differ from start_hz in a row of several points");
+    sweep.sub_bands.push_back(
+        {.start_hz = row[0], .stop_hz = row[1], .points = static_cast<std::uint32_t>(row[2])});
+  }
+  if (sweep.sub_bands.empty()) section.refuse("sub_band_table", "must have a row");
+}
+
 void read_frequencies(const Section& section, double rate_hz, SweepSettings& sweep) {
   const std::string spacing = section.choice("spacing", {"logarithmic", "linear", "list"});
   if (spacing == "list") {
@@ -56,12 +75,19 @@ void read_frequencies(const Section& section, double rate_hz, SweepSettings& swe
     return;
   }
   sweep.spacing = spacing == "linear" ? Spacing::linear : Spacing::logarithmic;
+  if (section.has("sub_band_table")) {
+    read_sub_band_table(section, rate_hz, sweep);
+    return;
+  }
   sweep.start_hz = read_frequency(section, "start_hz", rate_hz);
   sweep.stop_hz = read_frequency(section, "stop_hz", rate_hz);
-  sweep.points = static_cast<std::uint32_t>(section.integer("points", {.min = 1, .max = 100'000}));
+  sweep.points = static_cast<std::uint32_t>(section.integer("points", point_count));
   if (sweep.points > 1 && sweep.start_hz == sweep.stop_hz) {
     section.refuse("stop_hz", "must differ from start_hz when there is more than one point");
   }
+  const auto sub_bands =
+      static_cast<std::uint32_t>(section.integer("sub_bands", {.min = 1, .max = 100}, 1));
+  if (sub_bands > 1) sweep.sub_bands = equal_sub_bands(sweep, sub_bands);
 }
 
 void read_amplitude(const Section& section, SweepSettings& sweep) {

@@ -9,17 +9,17 @@ namespace sinerig::identify {
 
 namespace {
 
-std::vector<Response> split(const Response& response, const HassulOrders& orders, int bands) {
-  const double log_first = std::log(response.front().omega_rad_s);
-  const double log_width = (std::log(response.back().omega_rad_s) - log_first) / bands;
+std::vector<Response> split(const Response& response, const HassulOrders& orders,
+                            const std::vector<double>& edges_rad_s) {
+  // Two real equations a point, 2(n+m+1) of them a band.
   const auto least_points = static_cast<std::size_t>(orders.n + orders.m + 1);
   std::vector<Response> parts(1);
-  int band = 0;
+  std::size_t band = 0;
   for (const ResponsePoint& point : response) {
-    const double position = (std::log(point.omega_rad_s) - log_first) / log_width;
-    const int reached = std::min(static_cast<int>(position + 1e-9), bands - 1);
+    std::size_t reached = band;
+    while (reached < edges_rad_s.size() && point.omega_rad_s > edges_rad_s[reached]) ++reached;
     if (reached > band && parts.back().size() >= least_points) parts.emplace_back();
-    band = std::max(band, reached);
+    band = reached;
     parts.back().push_back(point);
   }
   if (parts.size() > 1 && parts.back().size() < least_points) {
@@ -34,16 +34,36 @@ std::vector<Response> split(const Response& response, const HassulOrders& orders
 constexpr double weight_floor = 1e-4;
 // Below this the spread of the models is rounding: exact data.
 constexpr double no_spread = 1e-12;
+// A point this close to an edge of equal sub-bands is on it, and opens the upper one.
+constexpr double edge_tolerance = 1e-9;
 
 }  // namespace
 
-ChoeFit fit_choe(const Response& response, const HassulOrders& orders, int bands) {
+std::vector<double> equal_band_edges(const Response& response, int bands) {
   if (bands < 1)
     throw std::invalid_argument("choe: " + std::to_string(bands) +
                                 " sub-bands; at least 1 is needed, 3 is usual");
   check_response(response, 1);
+  const double log_first = std::log(response.front().omega_rad_s);
+  const double log_width = (std::log(response.back().omega_rad_s) - log_first) / bands;
+  std::vector<double> edges;
+  for (int i = 1; i < bands; ++i)
+    edges.push_back(std::exp(log_first + i * log_width) * (1.0 - edge_tolerance));
+  return edges;
+}
+
+ChoeFit fit_choe(const Response& response, const HassulOrders& orders, int bands) {
+  return fit_choe(response, orders, equal_band_edges(response, bands));
+}
+
+ChoeFit fit_choe(const Response& response, const HassulOrders& orders,
+                 const std::vector<double>& edges_rad_s) {
+  check_response(response, 1);
+  for (std::size_t i = 0; i < edges_rad_s.size(); ++i)
+    if (!(edges_rad_s[i] > (i == 0 ? 0.0 : edges_rad_s[i - 1])))
+      throw std::invalid_argument("choe: the edges of the sub-bands must rise; sort them");
   ChoeFit fit;
-  fit.bands = split(response, orders, bands);
+  fit.bands = split(response, orders, edges_rad_s);
   for (const Response& band : fit.bands)
     fit.band_models.push_back(fit_hassul(band, orders, unit_weights(band)));
 

@@ -21,6 +21,15 @@ struct ChoeFit {
   TransferFunction model;                     // eq. (13) with that weight
 };
 
+// Frequencies between `bands` sub-bands of equal logarithmic width, rad/s: one less than bands.
+// Throws std::invalid_argument when bands < 1.
+std::vector<double> equal_band_edges(const Response& response, int bands);
+
+// edges_rad_s: rising frequencies that part the sub-bands; one that is measured belongs to the
+// lower band, as in a sweep by sub-bands. Throws std::invalid_argument when they do not rise.
+ChoeFit fit_choe(const Response& response, const HassulOrders& orders,
+                 const std::vector<double>& edges_rad_s);
+
 // bands: number of sub-bands of equal logarithmic width asked for; a band with fewer than
 // 2(n+m+1) real equations is merged with its upper neighbour (the last with its lower), so fewer
 // may come back. Where the models agree to 1e-12 of the largest response the weight is one.

@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "identify/response.h"
+#include "identify/root_covariance.h"
 #include "identify/transfer_function.h"
 
 namespace sinerig::identify {
@@ -71,6 +72,7 @@ struct Fit {
   std::vector<double> den_standard_error;
   // Of num, then den, then delay_s, in the order of `model`; the row of den[0] is zero.
   Eigen::MatrixXd covariance;
+  RootCovariance root_covariance;  // of zpk
   Estimate delay_s;
   Estimate static_gain;  // lim s^origin·G(s) at s = 0
   std::vector<RootEstimate> poles;
@@ -84,6 +86,7 @@ struct Fit {
   bool scatter_known = false;  // false: chi2 is in units of squared relative error, and the
                                // standard errors are scaled by chi2/degrees_of_freedom
   int free_parameters = 0;
+  double model_error = 0.0;  // the floor that was added to the scatter
   double condition = 0.0;  // of the Jacobian with columns of size one
   int iterations = 0;      // of the nonlinear stage, over all starts
   bool converged = false;

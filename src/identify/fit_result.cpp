@@ -30,8 +30,14 @@ struct Linearised {
   double condition;
 };
 
-Linearised linearise(const MatrixXd& J) {
+struct Inverse {
+  MatrixXd half;  // covariance of unit noise: half·half'
+  double condition;
+};
+
+Inverse invert(const MatrixXd& J) {
   const Index parameters = J.cols();
+  if (parameters == 0) return {MatrixXd(0, 0), 1.0};  // everything given
   const VectorXd size = J.colwise().norm().cwiseMax(1e-300);
   const MatrixXd scaled = J * size.cwiseInverse().asDiagonal();
   MatrixXd R = scaled.householderQr().matrixQR().topRows(parameters).triangularView<Eigen::Upper>();
@@ -40,8 +46,28 @@ Linearised linearise(const MatrixXd& J) {
     if (std::abs(R(i, i)) < 1e-15) R(i, i) = 1e-15;
   const MatrixXd inverse =
       R.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(parameters, parameters));
-  const MatrixXd half = size.cwiseInverse().asDiagonal() * inverse;
-  return {half * half.transpose(), singular[0] / singular[parameters - 1]};
+  return {size.cwiseInverse().asDiagonal() * inverse, singular[0] / singular[parameters - 1]};
+}
+
+Linearised linearise(const MatrixXd& J) {
+  const Inverse inverse = invert(J);
+  return {inverse.half * inverse.half.transpose(), inverse.condition};
+}
+
+// Unit noise of the whitened residual as it reaches the residual weighted otherwise.
+Linearised linearise(const MatrixXd& J, const FitData& white, const FitData& weighted) {
+  const Index g = white.points();
+  const Inverse inverse = invert(J);
+  const MatrixXd pseudo = inverse.half * (inverse.half.transpose() * J.transpose());
+  // e = (top, bottom)/whitening, weighted without correlation.
+  const Eigen::ArrayXd top = weighted.w_rr / white.w_rr;
+  const Eigen::ArrayXd across = -weighted.w_ii * white.w_ir / (white.w_rr * white.w_ii);
+  const Eigen::ArrayXd bottom = weighted.w_ii / white.w_ii;
+  MatrixXd reached(pseudo.rows(), 2 * g);
+  reached.leftCols(g) = pseudo.leftCols(g) * top.matrix().asDiagonal();
+  reached.leftCols(g) += pseudo.rightCols(g) * across.matrix().asDiagonal();
+  reached.rightCols(g) = pseudo.rightCols(g) * bottom.matrix().asDiagonal();
+  return {reached * reached.transpose(), inverse.condition};
 }
 
 std::vector<double> root_diagonal(const MatrixXd& covariance, Index first, std::size_t count) {
@@ -63,12 +89,8 @@ void describe_roots(const ParameterCovariance& parameters, Fit& fit) {
   });
 }
 
-}  // namespace
-
-Fit make_fit(const FitSetup& setup, const FitData& data, const Refined& refined,
-             const std::vector<Index>& outliers) {
-  const LocalModel model(data, setup.freedom, refined.rational);
-  const Linearised linearised = linearise(model.jacobian());
+Fit describe(const FitSetup& setup, const FitData& data, const Refined& refined,
+             const LocalModel& model, const Linearised& linearised) {
   Fit fit;
   fit.scatter_known = data.scatter_known;
   fit.chi2 = refined.rational.cost;
@@ -82,8 +104,6 @@ Fit make_fit(const FitSetup& setup, const FitData& data, const Refined& refined,
   fit.reason = refined.converged
                    ? "no step lowers chi2 any further"
                    : "the limit of iterations was reached; the orders may be too high";
-  for (const Index outlier : outliers) fit.outliers.push_back(static_cast<std::size_t>(outlier));
-
   const double variance =
       data.scatter_known || fit.degrees_of_freedom < 1 ? 1.0 : fit.chi2 / fit.degrees_of_freedom;
   const MatrixXd spread = model.spread_to_full();
@@ -100,7 +120,29 @@ Fit make_fit(const FitSetup& setup, const FitData& data, const Refined& refined,
       root_diagonal(fit.covariance, static_cast<Index>(fit.model.num.size()), fit.model.den.size());
   fit.delay_s = parameters->delay();
   fit.static_gain = parameters->static_gain();
+  fit.root_covariance = parameters->of_roots();
   describe_roots(*parameters, fit);
+  return fit;
+}
+
+}  // namespace
+
+Fit make_fit(const FitSetup& setup, const FitData& data, const Refined& refined,
+             const std::vector<Index>& outliers) {
+  const LocalModel model(data, setup.freedom, refined.rational);
+  Fit fit = describe(setup, data, refined, model, linearise(model.jacobian()));
+  for (const Index outlier : outliers) fit.outliers.push_back(static_cast<std::size_t>(outlier));
+  return fit;
+}
+
+Fit make_weighted_fit(const FitSetup& setup, const Refined& refined, const Eigen::ArrayXd& weight) {
+  FitData weighted = setup.data;
+  weighted.w_rr = weighted.w_ii = weight / (setup.data.H.abs() * weight.mean());
+  weighted.w_ir.setZero();
+  const LocalModel model(weighted, setup.freedom, refined.rational);
+  Fit fit = describe(setup, setup.data, refined, model,
+                     linearise(model.jacobian(), setup.data, weighted));
+  fit.reason = "the least squares are linear: one step is the solution";
   return fit;
 }
 

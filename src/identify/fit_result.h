@@ -15,4 +15,9 @@ namespace sinerig::identify {
 Fit make_fit(const FitSetup& setup, const FitData& data, const Refined& refined,
              const std::vector<Eigen::Index>& outliers);
 
+// The same for a model that minimises Σ (weight·relative error)² in place of χ², one weight per
+// point: the covariance is that of such an estimate under the scatter of the points,
+// J⁺·Λ·C·Λ·J⁺' with J the weighted Jacobian and C the covariance of the relative errors.
+Fit make_weighted_fit(const FitSetup& setup, const Refined& refined, const Eigen::ArrayXd& weight);
+
 }  // namespace sinerig::identify

@@ -23,6 +23,13 @@ constexpr double negligible_decrease = 1e-9;
 Refined refine(const FitData& data, const Freedom& freedom, const GridRational& start,
                int most_iterations) {
   Refined refined{start, 0, false};
+  if (freedom.parameters() == 0) {
+    LocalModel only(data, freedom, start);
+    refined.rational = only.on_grid();
+    refined.rational.cost = only.residual(only.parameters()).squaredNorm();
+    refined.converged = true;
+    return refined;
+  }
   double damping = first_damping;
   while (refined.iterations < most_iterations && !refined.converged) {
     LocalModel model(data, freedom, refined.rational);

@@ -129,7 +129,9 @@ Fit fit_maximum_likelihood(const Response& response, const FitOptions& options) 
   const HoldModel hold(options.hold_period_s, setup.fixed_and_path);
   if (options.hold_period_s > 0.0) include_hold(solution, setup.freedom, hold);
   enforce_constraints(solution.data, setup.freedom, solution.refined);
-  return make_fit(setup, solution.data, solution.refined, solution.outliers);
+  Fit fit = make_fit(setup, solution.data, solution.refined, solution.outliers);
+  fit.model_error = setup.data.scatter_known ? options.model_error : 0.0;
+  return fit;
 }
 
 }  // namespace sinerig::identify

@@ -39,9 +39,9 @@ struct OrderSelection {
 
 // First the lowest order whose most flexible structure (no pole at the origin, one zero less than
 // poles) is explained by the scatter; then all structures of that order and the two above it.
-// Criterion: χ² + p·(ln(2g) + 3) with known scatter (BIC and the price of many candidates, p free
+// Criterion: χ² + p·(ln(2g) + 4) with known scatter (BIC and the price of many candidates, p free
 // parameters, g points); where nothing is explained, or the scatter is unknown,
-// 2g·ln(χ²/2g) + p·(ln(2g) + 3), the same with the noise unknown.
+// 2g·ln(χ²/2g) + p·(ln(2g) + 4), the same with the noise unknown.
 // Throws std::invalid_argument as fit_maximum_likelihood does, and when no order is possible.
 OrderSelection select_order(const Response& response, const OrderSettings& settings);
 

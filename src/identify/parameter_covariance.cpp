@@ -182,6 +182,25 @@ MatrixXd ParameterCovariance::of_coefficients() const {
   return map * covariance_ * map.transpose();
 }
 
+RootCovariance ParameterCovariance::of_roots() const {
+  RootCovariance out{scale_, {}};
+  MatrixXd map = MatrixXd::Zero(coordinates_of(zpk_), covariance_.rows());
+  Index at = 0;
+  const auto add = [&](Complex root, const Row& row) {
+    map.row(at++) = row.real();
+    if (root.imag() > 0.0) map.row(at++) = row.imag();
+  };
+  for (const Complex pole : zpk_.poles)
+    if (pole.imag() >= 0.0) add(pole, pole_sensitivity(pole));
+  for (const Complex zero : zpk_.zeros)
+    if (zero.imag() >= 0.0) add(zero, zero_sensitivity(zero));
+  const Complex reference{0.0, scale_};
+  map.row(at++) = (response_sensitivity(reference) / zpk_.at(reference)).real();
+  map(at, covariance_.rows() - 1) = 1.0 / scale_;
+  out.covariance = map * covariance_ * map.transpose();
+  return out;
+}
+
 ResponsePoint Fit::response(double omega_rad_s) const {
   return parameters->response(omega_rad_s);
 }

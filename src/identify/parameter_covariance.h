@@ -7,6 +7,7 @@
 
 #include "identify/fit.h"
 #include "identify/orthonormal_basis.h"
+#include "identify/root_covariance.h"
 
 namespace sinerig::identify {
 
@@ -29,6 +30,7 @@ class ParameterCovariance {
   RootEstimate pole(std::complex<double> pole) const;
   RootEstimate zero(std::complex<double> zero) const;
   Mode mode(std::complex<double> pole) const;
+  RootCovariance of_roots() const;
   // Of num, den and delay_s of to_transfer_function(zpk()).
   Eigen::MatrixXd of_coefficients() const;
 

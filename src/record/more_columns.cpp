@@ -61,6 +61,11 @@ bool holds_numbers(Database& database, const std::string& column) {
   return row.step() && row.integer(0) > 0;
 }
 
+double number_at(const Json& object, const char* key) {
+  const auto found = object.find(key);
+  return found != object.end() && found->is_number() ? found->get<double>() : 0.0;
+}
+
 std::vector<double> numbers(const Json& array) {
   std::vector<double> values;
   for (const Json& each : array) {
@@ -78,6 +83,42 @@ std::vector<std::complex<double>> roots(const Json& array) {
       values.emplace_back(each[0].get<double>(), each[1].get<double>());
   }
   return values;
+}
+
+std::vector<std::vector<double>> rows(const Json& array) {
+  std::vector<std::vector<double>> values;
+  for (const Json& each : array) values.push_back(numbers(each));
+  return values;
+}
+
+// Nothing where a part is missing or of another length: another program may write such a key.
+std::optional<StoredChoe> choe_of(const Json& row) {
+  const auto json = row.find("choe");
+  if (json == row.end() || !json->is_object()) return {};
+  const auto part = [&](const char* key) {
+    return json->value(key, Json::array());
+  };
+  StoredChoe choe{.bands = {},
+                  .freq_hz = numbers(part("freq_hz")),
+                  .nominal = roots(part("nominal")),
+                  .additive = rows(part("additive")),
+                  .weight = numbers(part("weight"))};
+  const Json bands = part("bands");
+  const Json models = part("band_models");
+  const std::size_t points = choe.freq_hz.size();
+  bool whole = points > 0 && choe.nominal.size() == points && choe.weight.size() == points &&
+               bands.size() == models.size() && choe.additive.size() == models.size();
+  for (const auto& each : choe.additive) whole = whole && each.size() == points;
+  if (!whole) return {};
+  for (std::size_t k = 0; k < models.size(); ++k) {
+    if (!bands[k].is_object() || !models[k].is_object()) return {};
+    choe.bands.push_back({.low_hz = number_at(bands[k], "low_hz"),
+                          .high_hz = number_at(bands[k], "high_hz"),
+                          .num = numbers(models[k].value("num", Json::array())),
+                          .den = numbers(models[k].value("den", Json::array()))});
+    if (choe.bands.back().num.empty() || choe.bands.back().den.empty()) return {};
+  }
+  return choe;
 }
 
 std::string text_of(const Json& value) {
@@ -112,11 +153,6 @@ Json row_object(const Statement& row, const std::vector<std::string>& columns) {
   return object;
 }
 
-double number_at(const Json& object, const char* key) {
-  const auto found = object.find(key);
-  return found != object.end() && found->is_number() ? found->get<double>() : 0.0;
-}
-
 }  // namespace
 
 void read_more_columns(Database& database, std::vector<StoredResponse>& responses) {
@@ -143,9 +179,9 @@ std::vector<StoredFit> read_fits(Database& database) {
   if (!has_table(database, "fit")) return {};
   const std::vector<std::string> columns = columns_of(database, "fit");
   std::vector<StoredFit> fits;
-  Statement rows{database, "SELECT * FROM fit"};
-  while (rows.step()) {
-    const Json row = row_object(rows, columns);
+  Statement all{database, "SELECT * FROM fit"};
+  while (all.step()) {
+    const Json row = row_object(all, columns);
     StoredFit fit{.input = static_cast<std::uint32_t>(number_at(row, "input")),
                   .output = static_cast<std::uint32_t>(number_at(row, "output")),
                   .label = {},
@@ -157,7 +193,14 @@ std::vector<StoredFit> read_fits(Database& database) {
                   .gain = {},
                   .poles = roots(row.value("poles", Json::array())),
                   .zeros = roots(row.value("zeros", Json::array())),
+                  .root_covariance = {},
+                  .choe = choe_of(row),
                   .facts = {}};
+    if (const auto stored = row.find("root_covariance");
+        stored != row.end() && stored->is_object()) {
+      fit.reference_hz = number_at(*stored, "reference_hz");
+      fit.root_covariance = rows(stored->value("matrix", Json::array()));
+    }
     if (fit.num.empty() || fit.den.empty()) continue;
     if (row.contains("gain") && row["gain"].is_number()) fit.gain = number_at(row, "gain");
     if (row.contains("method")) fit.label = text_of(row["method"]);

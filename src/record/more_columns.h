@@ -15,6 +15,21 @@ namespace sinerig::record {
 class Database;
 struct StoredResponse;
 
+// The intermediates of a fit by Choe's method, on the grid freq_hz.
+struct StoredChoe {
+  struct Band {
+    double low_hz = 0.0;
+    double high_hz = 0.0;
+    std::vector<double> num;  // of its model, descending powers of s
+    std::vector<double> den;
+  };
+  std::vector<Band> bands;
+  std::vector<double> freq_hz;
+  std::vector<std::complex<double>> nominal;  // G_nom
+  std::vector<std::vector<double>> additive;  // |G_k − G_nom|, one row per band
+  std::vector<double> weight;                 // |W_a|
+};
+
 // A model of one response, from the table `fit`.
 struct StoredFit {
   std::uint32_t input = 0;
@@ -28,6 +43,11 @@ struct StoredFit {
   std::optional<double> gain;  // of zeros and poles, where the file holds it
   std::vector<std::complex<double>> poles;  // rad/s; empty where the file does not hold them
   std::vector<std::complex<double>> zeros;
+  // Of poles, zeros, gain and delay in the coordinates of identify::RootCovariance; empty where the
+  // file does not hold it.
+  double reference_hz = 0.0;
+  std::vector<std::vector<double>> root_covariance{};
+  std::optional<StoredChoe> choe{};
   std::vector<std::pair<std::string, std::string>> facts;  // all that is a single value
 };
 

@@ -28,7 +28,8 @@ CREATE TABLE dwell (             -- the plan
   ramp_samples   INTEGER NOT NULL,
   settle_samples INTEGER NOT NULL,    -- waited for before measuring, ramp included
   blocks         INTEGER NOT NULL,    -- measured at least
-  max_samples    INTEGER NOT NULL     -- of the whole dwell at most, settling included
+  max_samples    INTEGER NOT NULL,    -- of the whole dwell at most, settling included
+  sub_band       INTEGER NOT NULL DEFAULT 0 -- which of the sweep's sub-bands, from 0
 );
 
 CREATE TABLE tone (

@@ -30,12 +30,16 @@ void check_identity(Database& database, const std::string& path) {
 
 SweepPlan read_plan(Database& database, double rate_hz) {
   SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
+  // The column came after the first files of this version.
+  Statement column{database, "SELECT 1 FROM pragma_table_info('dwell') WHERE name = 'sub_band'"};
+  const std::string sub_band = column.step() ? "sub_band" : "0";
   Statement dwells{database,
                    "SELECT asked_hz, block_samples, ramp_samples, settle_samples, blocks, "
-                   "max_samples "
-                   "FROM dwell ORDER BY id"};
+                   "max_samples, " +
+                       sub_band + " FROM dwell ORDER BY id"};
   while (dwells.step()) {
     plan.dwells.push_back({.asked_hz = dwells.number(0),
+                           .sub_band = whole<std::uint32_t>(dwells, 6),
                            .block_samples = whole<std::uint64_t>(dwells, 1),
                            .tones = {},
                            .ramp_samples = whole<std::uint64_t>(dwells, 2),

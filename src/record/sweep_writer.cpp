@@ -136,11 +136,11 @@ void SweepWriter::set(const std::string& key, const std::string& value) {
 }
 
 void SweepWriter::write_dwell(std::size_t index, const Dwell& dwell) {
-  Statement insert_dwell{database_, "INSERT INTO dwell VALUES (?, ?, ?, ?, ?, ?, ?)"};
+  Statement insert_dwell{database_, "INSERT INTO dwell VALUES (?, ?, ?, ?, ?, ?, ?, ?)"};
   Statement insert_tone{database_, "INSERT INTO tone VALUES (?, ?, ?, ?, ?)"};
   insert_dwell
       .bind(index, dwell.asked_hz, dwell.block_samples, dwell.ramp_samples, dwell.settle_samples,
-            dwell.blocks, dwell.max_samples)
+            dwell.blocks, dwell.max_samples, dwell.sub_band)
       .run();
   for (std::size_t k = 0; k < dwell.tones.size(); ++k) {
     const Tone& tone = dwell.tones[k];

@@ -6,6 +6,8 @@
 #include <stdexcept>
 
 #include "identify/hold.h"
+#include "identify/loop_curve.h"
+#include "identify/root_covariance.h"
 #include "identify/transfer_function.h"
 
 namespace sinerig::report {
@@ -52,6 +54,35 @@ std::vector<std::complex<double>> model_response(const record::StoredFit& fit,
                    return value * std::polar(1.0, -turn * hz * fit.path_delay_s);
                  });
   return response;
+}
+
+ModelBand model_band(const record::StoredFit& fit, const std::vector<double>& frequency_hz) {
+  constexpr double z95 = 1.959964;
+  const identify::ZerosPolesGain model = roots_of(fit);
+  const auto size = static_cast<Eigen::Index>(fit.root_covariance.size());
+  if (size == 0 || size != identify::coordinates_of(model)) return {};
+  identify::RootCovariance covariance{turn * fit.reference_hz, Eigen::MatrixXd(size, size)};
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const std::vector<double>& row = fit.root_covariance[static_cast<std::size_t>(i)];
+    if (row.size() != fit.root_covariance.size()) return {};
+    covariance.covariance.row(i) = Eigen::Map<const Eigen::RowVectorXd>(row.data(), size);
+  }
+  ModelBand band;
+  for (const double hz : frequency_hz) {
+    const identify::LogScatter scatter =
+        identify::log_scatter(identify::response_with_covariance(model, covariance, turn * hz));
+    band.gain.push_back(z95 * std::sqrt(scatter.gain));
+    band.phase_rad.push_back(z95 * std::sqrt(scatter.phase));
+  }
+  return band;
+}
+
+const record::StoredFit* latest_choe(const record::StoredRun& run,
+                                     const record::StoredResponse& response) {
+  const auto found = std::find_if(run.fits.rbegin(), run.fits.rend(), [&](const auto& fit) {
+    return fit.choe && fit.input == response.input && fit.output == response.output;
+  });
+  return found == run.fits.rend() ? nullptr : &*found;
 }
 
 const record::StoredFit* latest_fit(const record::StoredRun& run,

@@ -14,6 +14,18 @@ namespace sinerig::report {
 std::vector<std::complex<double>> model_response(const record::StoredFit& fit,
                                                  const std::vector<double>& frequency_hz);
 
+// Relative half widths of the 95 % intervals of the model's gain (of the amplitude) and phase
+// (rad), one each per frequency; empty where the file holds no covariance of the model.
+struct ModelBand {
+  std::vector<double> gain;
+  std::vector<double> phase_rad;
+};
+ModelBand model_band(const record::StoredFit& fit, const std::vector<double>& frequency_hz);
+
+// The latest fit of a response by Choe's method, with what led to it; nothing where it has none.
+const record::StoredFit* latest_choe(const record::StoredRun& run,
+                                     const record::StoredResponse& response);
+
 // The latest fit of a response, nothing where it has none.
 const record::StoredFit* latest_fit(const record::StoredRun& run,
                                     const record::StoredResponse& response);

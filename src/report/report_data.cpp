@@ -6,6 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "identify/transfer_function.h"
 #include "record/confidence.h"
 #include "report/model_curve.h"
 #include "report/run_summary.h"
@@ -59,11 +60,15 @@ Json model_json(const record::StoredFit& fit, const StoredResponse& response) {
   for (const double each : curve_grid(fit, grid.front(), grid.back())) grid.push_back(each);
   std::sort(grid.begin(), grid.end());
   const std::vector<std::complex<double>> curve = model_response(fit, grid);
+  const ModelBand band = model_band(fit, grid);
   for (std::size_t i = 0; i < grid.size(); ++i) {
     model["f"].push_back(number(grid[i], 8));
     model["re"].push_back(number(curve[i].real(), 7));
     model["im"].push_back(number(curve[i].imag(), 7));
   }
+  model["gain95"] = model["phase95"] = Json::array();
+  for (const double each : band.gain) model["gain95"].push_back(number(each, 4));
+  for (const double each : band.phase_rad) model["phase95"].push_back(number(each, 4));
   model["facts"] = fit.facts;
   model["poles"] = roots_json(fit.poles);
   model["zeros"] = roots_json(fit.zeros);
@@ -75,6 +80,34 @@ Json models_json(const StoredRun& run, const StoredResponse& response) {
   const record::StoredFit* fit = latest_fit(run, response);
   if (fit != nullptr && !response.points.empty()) models.push_back(model_json(*fit, response));
   return models;
+}
+
+// The models of the sub-bands and their mean, the differences, and the weight, by magnitude.
+Json choe_json(const StoredRun& run, const StoredResponse& response) {
+  const record::StoredFit* fit = latest_choe(run, response);
+  if (fit == nullptr) return nullptr;
+  const record::StoredChoe& choe = *fit->choe;
+  Json json{{"f", Json::array()}, {"bands", Json::array()}};
+  for (const double each : choe.freq_hz) json["f"].push_back(number(each, 8));
+  for (std::size_t k = 0; k < choe.bands.size(); ++k) {
+    const auto& band = choe.bands[k];
+    const identify::TransferFunction model{.num = band.num, .den = band.den};
+    Json gain = Json::array();
+    Json additive = Json::array();
+    for (std::size_t i = 0; i < choe.freq_hz.size(); ++i) {
+      const double omega = 2.0 * std::numbers::pi * choe.freq_hz[i];
+      gain.push_back(number(std::abs(model.at(omega)), 7));
+      additive.push_back(number(choe.additive[k][i], 7));
+    }
+    json["bands"].push_back({{"low_hz", number(band.low_hz, 8)},
+                             {"high_hz", number(band.high_hz, 8)},
+                             {"gain", gain},
+                             {"additive", additive}});
+  }
+  json["nominal"] = json["weight"] = Json::array();
+  for (const auto& each : choe.nominal) json["nominal"].push_back(number(std::abs(each), 7));
+  for (const double each : choe.weight) json["weight"].push_back(number(each, 7));
+  return json;
 }
 
 // Figures that get a plot each only where they hold something.
@@ -109,6 +142,7 @@ Json response_json(const StoredRun& run, const StoredResponse& response, const s
             {"output_unit", run.channels.at(response.output).unit}};
   json.update(point_columns(response.points));
   json["models"] = models_json(run, response);
+  json["choe"] = choe_json(run, response);
   return json;
 }
 

@@ -80,6 +80,39 @@ std::string bench_time_text(const SweepPlan& plan) {
          text(" (%.1f to %.1f s)", plan.min_seconds(), plan.max_seconds());
 }
 
+namespace {
+
+// The sweeps that the plan consists of, where there are several.
+std::string sub_bands_text(const SweepPlan& plan) {
+  std::string lines;
+  std::size_t points = 0;
+  for (std::size_t first = 0; first < plan.dwells.size();) {
+    std::size_t end = first;
+    const std::size_t first_point = points + 1;
+    double low_hz = unlimited;
+    double high_hz = 0.0;
+    SweepPlan part{.rate_hz = plan.rate_hz, .dwells = {}};
+    for (; end < plan.dwells.size() && plan.dwells[end].sub_band == plan.dwells[first].sub_band;
+         ++end) {
+      const Dwell& dwell = plan.dwells[end];
+      for (const Tone& tone : dwell.tones) {
+        low_hz = std::min(low_hz, dwell.tone_hz(tone, plan.rate_hz));
+        high_hz = std::max(high_hz, dwell.tone_hz(tone, plan.rate_hz));
+      }
+      points += dwell.tones.size();
+      part.dwells.push_back(dwell);
+    }
+    lines += text("sub-band %u: points %zu to %zu, %.6g to %.6g Hz, %s\n",
+                  plan.dwells[first].sub_band + 1, first_point, points, low_hz, high_hz,
+                  bench_time_text(part).c_str());
+    first = end;
+  }
+  const bool several = !plan.dwells.empty() && plan.dwells.back().sub_band > 0;
+  return several ? lines : "";
+}
+
+}  // namespace
+
 void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings& sweep,
                 const std::string& unit) {
   stream << text("amplitude in %s, velocity in %s/s, acceleration in %s/s²\n", unit.c_str(),
@@ -102,6 +135,7 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
     }
   }
   stream << break_points(sweep);
+  stream << sub_bands_text(plan);
   const std::size_t asked = asked_frequencies(sweep).size();
   if (asked > points) {
     stream << asked - points << " of " << asked

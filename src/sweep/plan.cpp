@@ -65,6 +65,11 @@ void check_band(const SweepSettings& sweep, double rate_hz) {
     for (const double frequency_hz : sweep.frequencies_hz) check("frequencies_hz", frequency_hz);
     return;
   }
+  for (const SubBand& band : sweep.sub_bands) {
+    check("sub_band_table", band.start_hz);
+    check("sub_band_table", band.stop_hz);
+  }
+  if (!sweep.sub_bands.empty()) return;
   check("start_hz", sweep.start_hz);
   check("stop_hz", sweep.stop_hz);
 }
@@ -192,6 +197,28 @@ Baseline make_baseline(const SweepSettings& sweep, double rate_hz) {
   return baseline;
 }
 
+struct AskedGroup {
+  std::vector<double> frequencies_hz;
+  std::uint32_t sub_band = 0;
+};
+
+// What is measured in one dwell each; no group reaches over the edge of a sub-band.
+std::vector<AskedGroup> groups_of(const std::vector<AskedFrequency>& asked, std::size_t tones) {
+  std::vector<AskedGroup> groups;
+  for (std::size_t first = 0; first < asked.size();) {
+    const std::uint32_t sub_band = asked[first].sub_band;
+    std::vector<double> band;
+    for (; first < asked.size() && asked[first].sub_band == sub_band; ++first)
+      band.push_back(asked[first].hz);
+    if (tones > 1) {
+      for (const auto& group : interleaved(band, tones)) groups.push_back({group, sub_band});
+    } else {
+      for (const double hz : band) groups.push_back({{hz}, sub_band});
+    }
+  }
+  return groups;
+}
+
 bool same_frequency(const Dwell& a, const Dwell& b) {
   if (a.tones.size() > 1 || b.tones.size() > 1) return false;
   return a.tones.front().cycles * b.block_samples == b.tones.front().cycles * a.block_samples;
@@ -249,20 +276,6 @@ std::uint64_t SweepPlan::max_samples() const {
   return sum;
 }
 
-std::vector<double> asked_frequencies(const SweepSettings& sweep) {
-  if (sweep.spacing == Spacing::list) return sweep.frequencies_hz;
-  std::vector<double> frequencies_hz(sweep.points);
-  for (std::uint32_t i = 0; i < sweep.points; ++i) {
-    const double position = sweep.points == 1 ? 0.0 : static_cast<double>(i) / (sweep.points - 1);
-    frequencies_hz[i] = sweep.spacing == Spacing::linear
-                            ? sweep.start_hz + (sweep.stop_hz - sweep.start_hz) * position
-                            : sweep.start_hz * std::pow(sweep.stop_hz / sweep.start_hz, position);
-  }
-  // The ends are what was asked for, not what pow() makes of them.
-  if (sweep.points > 1) frequencies_hz.back() = sweep.stop_hz;
-  return frequencies_hz;
-}
-
 double amplitude_at(const SweepSettings& sweep, double frequency_hz) {
   const double omega_rad_s = two_pi * frequency_hz;
   const double wanted = sweep.amplitude_table.empty()
@@ -273,8 +286,8 @@ double amplitude_at(const SweepSettings& sweep, double frequency_hz) {
 }
 
 SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, double rate_hz) {
-  const std::vector<double> frequencies_hz = asked_frequencies(sweep);
-  if (frequencies_hz.empty()) {
+  const std::vector<AskedFrequency> asked = asked_of(sweep);
+  if (asked.empty()) {
     throw PlanRefused("sweep", "points", "no frequency to measure: give at least one");
   }
   check_band(sweep, rate_hz);
@@ -288,15 +301,10 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,
                     .max_distortion = sweep.max_distortion};
-  std::vector<std::vector<double>> groups;
-  if (sweep.tones > 1) {
-    groups = interleaved(frequencies_hz, sweep.tones);
-  } else {
-    for (const double asked_hz : frequencies_hz) groups.push_back({asked_hz});
-  }
-  for (const std::vector<double>& group : groups) {
+  for (const AskedGroup& group : groups_of(asked, sweep.tones)) {
     const Dwell* before = plan.dwells.empty() ? nullptr : &plan.dwells.back();
-    Dwell dwell = make_group(group, sweep, rate_hz, before);
+    Dwell dwell = make_group(group.frequencies_hz, sweep, rate_hz, before);
+    dwell.sub_band = group.sub_band;
     const bool duplicate =
         std::any_of(plan.dwells.begin(), plan.dwells.end(),
                     [&](const Dwell& other) { return same_frequency(dwell, other); });

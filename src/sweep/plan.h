@@ -40,11 +40,22 @@ struct Level {
   bool wanted() const { return response > 0.0; }
 };
 
+// One of the sweeps that a sweep by sub-bands consists of (Choe, "A Simple Method for Frequency
+// Domain Identification", section 3, step 1).
+struct SubBand {
+  double start_hz = 0.0;
+  double stop_hz = 0.0;
+  std::uint32_t points = 0;
+};
+
 struct SweepSettings {
   Spacing spacing = Spacing::logarithmic;
   double start_hz = 0.0;
   double stop_hz = 0.0;
   std::uint32_t points = 0;
+  // Where not empty: these sweeps one after the other, spaced alike, in place of the three above. A
+  // frequency where one ends and the next begins is measured once, in the first.
+  std::vector<SubBand> sub_bands;
   std::vector<double> frequencies_hz;  // for Spacing::list, in the order to be run
   double frequency_tolerance = 1e-3;   // relative, for the snap to whole cycles in whole samples
   std::uint32_t tones = 1;             // in one dwell, at most
@@ -100,6 +111,7 @@ struct Tone {
 // One group of tones held: ramp and wait, then blocks until the judgement is made.
 struct Dwell {
   double asked_hz = 0.0;
+  std::uint32_t sub_band = 0;       // which of the sub-bands it belongs to, from 0
   std::uint64_t block_samples = 1;  // whole cycles of every tone
   std::uint32_t parts = 1;          // a block is cut into this many, a power of two
   std::vector<Tone> tones;
@@ -176,7 +188,19 @@ class PlanRefused : public std::invalid_argument {
   std::string key_;
 };
 
-// The frequencies asked for, in Hz and in running order.
+// The range of a sweep cut into `count` sub-bands of equal width, logarithmic or linear as its
+// spacing, each with all its points.
+std::vector<SubBand> equal_sub_bands(const SweepSettings& sweep, std::uint32_t count);
+
+struct AskedFrequency {
+  double hz = 0.0;
+  std::uint32_t sub_band = 0;
+};
+
+// What the settings ask for, in running order, before it is snapped to the grid of the loop.
+std::vector<AskedFrequency> asked_of(const SweepSettings& sweep);
+
+// The frequencies asked for, in Hz and in running order, those of all sub-bands included.
 std::vector<double> asked_frequencies(const SweepSettings& sweep);
 
 // The amplitude at a frequency: the constant or the table, held under the velocity and acceleration

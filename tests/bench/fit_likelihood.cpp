@@ -3,7 +3,10 @@
 #include <random>
 #include <vector>
 
+#include <Eigen/QR>
+
 #include "fit_cases.h"
+#include "identify/root_covariance.h"
 
 namespace sinerig::bench {
 
@@ -45,6 +48,41 @@ Outcome random_gimbals(std::uint64_t seed, int runs, double sigma, int points, D
   return outcome;
 }
 
+// The error of an estimate that is efficient by construction: least squares on the model linearised
+// at the true plant, on the same noise. What is left above the CRLB in its 95 % is chance.
+double efficient_rms_db(const ZerosPolesGain& plant, const Response& response, double sigma) {
+  const auto g = static_cast<Eigen::Index>(response.size());
+  const double reference = plant.poles.empty() ? 1.0 : std::abs(plant.poles.front());
+  const Eigen::Index coordinates = coordinates_of(plant) - 1;  // the delay is known
+  Eigen::MatrixXd J(2 * g, coordinates);
+  for (Eigen::Index k = 0; k < coordinates; ++k) {
+    constexpr double width = 1e-6;
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(coordinates + 1);
+    step[k] = k + 1 == coordinates ? width : width * reference;
+    const ZerosPolesGain ahead = moved(plant, reference, step);
+    const ZerosPolesGain behind = moved(plant, reference, -step);
+    for (Eigen::Index i = 0; i < g; ++i) {
+      const double omega = response[static_cast<std::size_t>(i)].omega_rad_s;
+      const std::complex<double> slope =
+          (ahead.at(omega) - behind.at(omega)) / (2.0 * step[k] * plant.at(omega));
+      J(i, k) = slope.real();
+      J(g + i, k) = slope.imag();
+    }
+  }
+  Eigen::VectorXd noise(2 * g);
+  for (Eigen::Index i = 0; i < g; ++i) {
+    const ResponsePoint& point = response[static_cast<std::size_t>(i)];
+    const std::complex<double> relative = point.response / plant.at(point.omega_rad_s) - 1.0;
+    noise[i] = relative.real() / sigma;
+    noise[g + i] = relative.imag() / sigma;
+  }
+  const Eigen::VectorXd size = J.colwise().norm();
+  const Eigen::MatrixXd scaled = J * size.cwiseInverse().asDiagonal();
+  const Eigen::VectorXd error = scaled * scaled.colPivHouseholderQr().solve(noise);
+  return 20.0 / std::numbers::ln10 * sigma * error.head(g).norm() /
+         std::sqrt(static_cast<double>(g));
+}
+
 void add_gross_outliers(Response& response, int count, Random& random) {
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   std::vector<std::size_t> hit;
@@ -66,7 +104,8 @@ void bench_likelihood(FitBench& bench) {
   table.section("Maximum likelihood: example 3 at 1 %");
   const ZerosPolesGain example = to_zeros_poles_gain(choe_example_3());
   Outcome a;
-  for (int run = 0; run < 5 * bench.runs; ++run) {
+  // A median of 1000 runs still scatters by 1.4 %.
+  for (int run = 0; run < 50 * bench.runs; ++run) {
     const Response response = noisy_response(example, choe_grid(), 0.01, random);
     run_once(a, example, choe_grid(), response, options_for(example, Delay::none), 0.01);
   }
@@ -103,19 +142,26 @@ void bench_likelihood(FitBench& bench) {
 
   table.section("Modes over four decades, 400 points, 1 %");
   Outcome all;
+  std::vector<double> efficient;
   for (const int order : {8, 12, 18, 26}) {
     Outcome wide;
-    for (int run = 0; run < bench.runs / 4; ++run) {
+    for (int run = 0; run < bench.runs; ++run) {
       const ZerosPolesGain plant = wide_plant(order / 2, random);
       const Response response = noisy_response(plant, wide_grid(), 0.01, random);
       for (Outcome* outcome : {&wide, &all})
         run_once(*outcome, plant, wide_grid(), response, options_for(plant, Delay::none), 0.01);
+      const int parameters = static_cast<int>(plant.poles.size() + plant.zeros.size()) + 1;
+      efficient.push_back(efficient_rms_db(plant, response, 0.01) /
+                          crlb_db(0.01, parameters, response.size()));
     }
     const std::string at = "order " + std::to_string(order) + ": ";
     table.at_least(at + "within 2 x CRLB", wide.percent_within_two(), 100.0, "%");
     table.figure(at + "ratio, 95 %", quantile(wide.ratio, 0.95), "");
   }
-  table.at_most("all orders: ratio, 95 %", quantile(all.ratio, 0.95), 1.25, "");
+  const double by_chance = quantile(efficient, 0.95);
+  table.figure("all orders: ratio, 95 %, of an efficient estimate by construction", by_chance, "");
+  table.at_most("all orders: ratio, 95 % [1.25, or 1.02 of the efficient one]",
+                quantile(all.ratio, 0.95), std::max(1.25, 1.02 * by_chance), "");
 
   table.section("Exact data: largest gain error");
   for (const int order : {8, 12, 18, 26}) {
@@ -130,7 +176,7 @@ void bench_likelihood(FitBench& bench) {
 
   table.section("3 of 100 points gross outliers, gimbal b and random gimbals, 1 %, delay unknown");
   Outcome with_outliers;
-  for (int run = 0; run < bench.runs; ++run) {
+  for (int run = 0; run < 5 * bench.runs; ++run) {
     const RandomGimbal<Random> gimbal(random);
     const ZerosPolesGain plant = run % 2 == 0 ? gimbal_b() : gimbal.plant;
     Response response = noisy_response(plant, gimbal_grid(), 0.01, random);

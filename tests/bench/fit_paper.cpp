@@ -1,4 +1,5 @@
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <random>
 
@@ -38,15 +39,20 @@ TransferFunction likelihood(const Response& response, const HassulOrders& orders
   return fit_maximum_likelihood(response, options).model;
 }
 
-double median_rms(const TransferFunction& plant, const HassulOrders& orders, const Method& method,
-                  double sigma, int runs, std::uint64_t seed) {
+std::vector<double> all_rms(const TransferFunction& plant, const HassulOrders& orders,
+                            const Method& method, double sigma, int runs, std::uint64_t seed) {
   Random random(seed);
   std::vector<double> rms_db;
   for (int run = 0; run < runs; ++run) {
     const Response response = noisy_response(plant, choe_grid(), sigma, random);
     rms_db.push_back(gain_error(method(response, orders), plant, choe_grid()).rms_db);
   }
-  return quantile(rms_db, 0.5);
+  return rms_db;
+}
+
+double median_rms(const TransferFunction& plant, const HassulOrders& orders, const Method& method,
+                  double sigma, int runs, std::uint64_t seed) {
+  return quantile(all_rms(plant, orders, method, sigma, runs, seed), 0.5);
 }
 
 ZerosPolesGain damped_plant(int n, int m, int k) {
@@ -120,14 +126,26 @@ void bench_paper(FitBench& bench) {
                       {"eq. (16), rad/s", equation_16, {0.0030, 0.030, 0.091}},
                       {"Choe", choe, {0.0021, 0.024, 0.066}}};
   const double sigmas[] = {0.001, 0.01, 0.03};
-  table.section("Example 3 (347), median rms; reference within 10 %");
+  table.section("Example 3 (347), median rms; the reference within 10 %, its own chance beside");
+  table.note(
+      "The reference is a median of 200 runs; such medians lie in the brackets in 95 of 100");
+  table.note(
+      "cases (order statistics of the runs here). The bound is met where the reference comes");
+  table.note("within 10 % of a value in the brackets.");
   for (const Row& row : rows)
     for (int i = 0; i < 3; ++i) {
-      const double rms_db = median_rms(choe_example_3(), {3, 0, 0}, row.method, sigmas[i],
-                                       5 * bench.runs, bench.seed);
+      const auto rms_db =
+          all_rms(choe_example_3(), {3, 0, 0}, row.method, sigmas[i], 25 * bench.runs, bench.seed);
       const double reference = row.published_db[i];
-      table.within(row.name + " at " + std::to_string(100.0 * sigmas[i]).substr(0, 3) + " %",
-                   rms_db, 0.9 * reference, 1.1 * reference, "dB");
+      // Half of 200 runs, give or take 1.96·sqrt(200)/2.
+      const double low = quantile(rms_db, 0.431);
+      const double high = quantile(rms_db, 0.569);
+      char name[96];
+      std::snprintf(name, sizeof name, "%s at %g %% [%.4g to %.4g]", row.name.c_str(),
+                    100.0 * sigmas[i], low, high);
+      const double median = quantile(rms_db, 0.5);
+      table.within(name, median, 0.9 * reference * median / high, 1.1 * reference * median / low,
+                   "dB");
     }
   table.at_most("Choe at 1 %",
                 median_rms(choe_example_3(), {3, 0, 0}, choe, 0.01, 5 * bench.runs, bench.seed),

@@ -2,6 +2,8 @@
 #include <cmath>
 #include <complex>
 #include <cstdio>
+#include <fstream>
+#include <iterator>
 #include <numbers>
 #include <string>
 
@@ -95,26 +97,125 @@ TEST_F(FitCommand, RefusesTooFewPointsForTheOrder) {
 
 TEST_F(FitCommand, RefusesFrequenciesOutOfOrderOrTwice) {
   refuses("1,1,0\n3,0.9,-0.1\n2,0.8,-0.2\n4,0.7,-0.2\n",
-          "response point 3 (2 Hz): the frequencies must ascend; sort the points");
+          "response.csv:3: 2 Hz comes after 3 Hz: the frequencies must ascend; sort the lines");
   refuses("1,1,0\n2,0.9,-0.1\n2,0.8,-0.2\n4,0.7,-0.2\n",
-          "response point 3 (2 Hz): the frequency occurs twice");
-  refuses("0,1,0\n2,0.9,-0.1\n3,0.8,-0.2\n", "the frequency must be finite and above zero");
+          "response.csv:3: 2 Hz: the frequency occurs twice; merge the two points or remove one");
+  refuses("0,1,0\n2,0.9,-0.1\n3,0.8,-0.2\n",
+          "response.csv:1: the frequency is 0 Hz, but it must be above zero");
 }
 
 TEST_F(FitCommand, RefusesWhatIsNoResponse) {
-  refuses("1,1,0\n2,nan,-0.1\n3,0.8,-0.2\n", "response point 2 (2 Hz): the response is not finite");
+  refuses("1,1,0\n2,nan,-0.1\n3,0.8,-0.2\n", "response.csv:2: re is nan, not finite");
+  refuses("1,1,0\n2,0.9,\n3,0.8,-0.2\n", "response.csv:2: no value for im");
   refuses("1,0,0\n2,0,0\n3,0,0\n", "every point is zero; check that the right channels");
   refuses("1,1,0\n2,0,0\n3,1,0\n", "the response is exactly zero");
   refuses("1,1,0\n2,one,0\n", "response.csv:2: re is \"one\"; wanted a number");
   refuses("1,1\n", "fewer than three columns");
   refuses("", "holds no points; wanted lines of freq_hz,re,im[,std]");
+  refuses("freq_hz,re\n1,1\n", "the header has no column im");
 }
 
 TEST_F(FitCommand, SuspectsWrongUnits) {
   refuses("freq,re,im\n1,1,0\n",
-          "the header has no column freq_hz; wanted freq_hz (Hz, not rad/s)");
+          "the header has no column freq_hz (frequency in Hz) and none omega_rad_s (in rad/s)");
   refuses("1,1,0,40\n2,0.9,-0.1,40\n3,0.8,-0.2,40\n", "not in dB or per cent");
   refuses("1,1,0,-1\n", "std is below zero");
+  const std::string bode = "1,-3,-40\n2,-10,-80\n4,-20,-120\n8,-31,-150\n16,-43,-165\n";
+  refuses(bode, "re and im look like gain in dB and phase in degrees");
+  EXPECT_EQ(fit(bode, "--zeros 0 --poles 1 --delay none --trust-units").exit_code, 0);
+}
+
+TEST_F(FitCommand, ReadsWhatOtherProgramsWrite) {
+  const auto num = [&](const std::string& csv) {
+    const auto run = fit(csv, "--zeros 0 --poles 1 --delay none --json");
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return run.exit_code == 0 ? json::parse(run.output)["num"][0].get<double>() : 0.0;
+  };
+  // 100/(s + 100), at 100 rad/s and the powers of two about it.
+  std::string bode =
+      "\xEF\xBB\xBF"
+      "omega_rad_s;gain_db;phase_deg;remark\r\n";
+  std::string table = "remark\tim\tre\tfreq_hz\r\n";
+  for (double omega = 25.0; omega <= 400.0; omega *= 2.0) {
+    const std::complex<double> H = 100.0 / std::complex<double>{100.0, omega};
+    char line[160];
+    std::snprintf(line, sizeof line, "%.17g;%.17g;%.17g;x\r\n", omega,
+                  20.0 * std::log10(std::abs(H)), std::arg(H) * 360.0 / turn);
+    bode += line;
+    std::snprintf(line, sizeof line, "x\t%.17g\t%.17g\t%.17g\r\n", H.imag(), H.real(),
+                  omega / turn);
+    table += line;
+  }
+  EXPECT_NEAR(num(bode), 100.0, 1e-9);
+  EXPECT_NEAR(num(table), 100.0, 1e-9);
+}
+
+TEST_F(FitCommand, ThePapersMethodsGiveStandardErrorsToo) {
+  for (const std::string method : {"hassul", "hassul --weights 1/w", "choe"}) {
+    const auto run = fit(lag_csv(), "--zeros 0 --poles 1 --delay 0.002 --json --method " + method);
+    ASSERT_EQ(run.exit_code, 0) << run.errors;
+    const json model = json::parse(run.output);
+    EXPECT_EQ(model["den"][0].get<double>(), 1.0);
+    EXPECT_NEAR(model["den"][1].get<double>(), 100.0, 1e-7);
+    EXPECT_TRUE(model["converged"].get<bool>());
+    EXPECT_LT(model["chi2"].get<double>(), 1e-6);
+    EXPECT_GT(model["den_standard_error"][1].get<double>(), 0.0);
+    EXPECT_EQ(model.contains("choe"), method == "choe");
+  }
+}
+
+// With weights that differ by orders of magnitude the answer tells which of them were used.
+TEST_F(FitCommand, TakesWeightsFromAListAFileAColumnOrAFunction) {
+  std::string csv = "freq_hz,re,im,weight\n";
+  std::string list;
+  std::string file = "weight\n";
+  for (int i = 1; i <= 6; ++i) {
+    const double omega = 25.0 * i;
+    const std::complex<double> s{0.0, omega};
+    const std::complex<double> H = 200.0 / (s + 100.0) + 0.01 * i * i;
+    const double weight = std::abs(1.0 / (s + 50.0));
+    char line[160];
+    std::snprintf(line, sizeof line, "%.17g,%.17g,%.17g,%.17g\n", omega / turn, H.real(), H.imag(),
+                  weight);
+    csv += line;
+    std::snprintf(line, sizeof line, "%.17g", weight);
+    if (!list.empty()) list.append(",");
+    list.append(line);
+    file.append(line).append("\n");
+  }
+  workshop_.write("weights.txt", file);
+  const auto pole = [&](const std::string& weights) {
+    const auto run = fit(csv, "--zeros 0 --poles 1 --method hassul --json " + weights);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return run.exit_code == 0 ? json::parse(run.output)["den"][1].get<double>() : 0.0;
+  };
+  const double by_column = pole("--weights column");
+  EXPECT_GT(std::abs(by_column - pole("")), 1e-3);
+  EXPECT_NEAR(pole("--weights " + list), by_column, 1e-9 * by_column);
+  EXPECT_NEAR(pole("--weights weights.txt"), by_column, 1e-9 * by_column);
+  EXPECT_NEAR(pole("--weight-num 1 --weight-den 1,50"), by_column, 1e-9 * by_column);
+  refuses(csv, "--weights: 2 numbers for 6 points",
+          "--zeros 0 --poles 1 --method hassul --weights 1,2");
+  refuses(csv, "belong together", "--zeros 0 --poles 1 --method hassul --weight-num 1");
+  refuses(csv, "--weights belongs to --method hassul", "--zeros 0 --poles 1 --weights 1/w");
+}
+
+TEST_F(FitCommand, GivesSectionsStateSpaceAndDiscreteFormsWithErrors) {
+  const auto run = fit(lag_csv(), "--zeros 0 --poles 1 --json --discrete zoh --rate 800");
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json model = json::parse(run.output);
+  EXPECT_NEAR(model["sections"][0]["den"][2].get<double>(), 100.0, 1e-6);
+  EXPECT_NEAR(model["sections"][0]["den_standard_error"][2].get<double>(),
+              model["den_standard_error"][1].get<double>(), 1e-5);
+  EXPECT_NEAR(model["state_space"]["A"][0][0].get<double>(), -100.0, 1e-6);
+  EXPECT_GT(model["state_space"]["standard_error"]["B"][0].get<double>(), 0.0);
+  // The pole e^−0.125; the delay of 1.6 ticks adds one at 0.
+  const json& discrete = model["discrete"];
+  EXPECT_NEAR(discrete["den"][1].get<double>(), -std::exp(-0.125), 1e-7);
+  const double period_s = 1.0 / 800.0;
+  EXPECT_NEAR(discrete["den_standard_error"][1].get<double>(),
+              period_s * std::exp(-0.125) * model["den_standard_error"][1].get<double>(), 1e-7);
+  refuses(lag_csv(), "--discrete needs the rate", "--zeros 0 --poles 1 --discrete tustin");
 }
 
 TEST_F(FitCommand, RefusesOptionsThatMakeNoSense) {
@@ -125,6 +226,27 @@ TEST_F(FitCommand, RefusesOptionsThatMakeNoSense) {
   const auto absent = workshop_.sinerig("fit nowhere.csv");
   EXPECT_EQ(absent.exit_code, 2);
   EXPECT_THAT(absent.errors, HasSubstr("nowhere.csv: cannot be read"));
+}
+
+TEST_F(FitCommand, ChoeTakesTheSubBandsThatTheSweepPlanned) {
+  std::ifstream file{SINERIG_SOURCE_DIR "/config/chebyshev.toml"};
+  std::string rig{std::istreambuf_iterator<char>{file}, {}};
+  const std::size_t points = rig.find("\npoints = ");
+  ASSERT_NE(points, std::string::npos);
+  rig.replace(points, rig.find('\n', points + 1) - points, "\npoints = 12\nsub_bands = 4");
+  workshop_.write("bands.toml", rig);
+  const auto plan = workshop_.sinerig("plan bands.toml");
+  EXPECT_THAT(plan.output, HasSubstr("sub-band 4: points 35 to 45"));
+  ASSERT_EQ(workshop_.sinerig("run bands.toml --no-report").exit_code, 0);
+  const std::string command = "fit bands.sweep --method choe --zeros 0 --poles 3 --json ";
+  const auto run = workshop_.sinerig(command);
+  ASSERT_EQ(run.exit_code, 0) << run.errors;
+  const json bands = json::parse(run.output)["choe"]["bands"];
+  ASSERT_EQ(bands.size(), 4U);
+  EXPECT_EQ(bands[0]["points"].get<int>(), 12);
+  EXPECT_EQ(bands[3]["points"].get<int>(), 11);
+  EXPECT_EQ(json::parse(workshop_.sinerig(command + "--bands 2").output)["choe"]["bands"].size(),
+            2U);
 }
 
 }  // namespace

@@ -125,6 +125,14 @@ INSTANTIATE_TEST_SUITE_P(
                "[frequency_hz, amplitude]"},
         Change{"TableEmpty", 7, "amplitude_table = []",
                "rig.toml:7: [sweep] amplitude_table = []: must have a row"},
+        Change{"SubBandRowTooShort", 7, "amplitude = 0.5\nsub_band_table = [[1, 5]]",
+               "rig.toml:8: [sweep] sub_band_table = [[1, 5]]: each row must be [start_hz, "
+               "stop_hz, points]"},
+        Change{"SubBandPastHalfTheRate", 7, "amplitude = 0.5\nsub_band_table = [[1, 500, 5]]",
+               "rig.toml:8: [sweep] sub_band_table = [[1, 500, 5]]: frequencies must be below half "
+               "the loop rate"},
+        Change{"NoSubBand", 7, "amplitude = 0.5\nsub_bands = 0",
+               "rig.toml:8: [sweep] sub_bands = 0: must be at least 1 and at most 100"},
         Change{"ToleranceTooWide", 7, "amplitude = 0.5\nfrequency_tolerance = 0.2",
                "rig.toml:8: [sweep] frequency_tolerance = 0.2: must be at least 1e-09 and at most "
                "0.1"},

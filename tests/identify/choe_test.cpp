@@ -55,5 +55,17 @@ TEST(Choe, MergesBandsThatHoldTooFewPoints) {
   EXPECT_THROW(fit_choe(response, {3, 0, 0}, 0), std::invalid_argument);
 }
 
+TEST(Choe, TakesTheSubBandsThatWereMeasured) {
+  std::mt19937_64 random(1);
+  const Response response = noisy_response(choe_example_3(), choe_grid(), 0.01, random);
+  const ChoeFit fit =
+      fit_choe(response, {3, 0, 0}, std::vector<double>{30.0, response[40].omega_rad_s});
+  ASSERT_EQ(fit.bands.size(), 3U);
+  EXPECT_LE(fit.bands[0].back().omega_rad_s, 30.0);
+  EXPECT_EQ(fit.bands[1].back().omega_rad_s, response[40].omega_rad_s);
+  EXPECT_THROW(fit_choe(response, {3, 0, 0}, std::vector<double>{30.0, 20.0}),
+               std::invalid_argument);
+}
+
 }  // namespace
 }  // namespace sinerig::identify

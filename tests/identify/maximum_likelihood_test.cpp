@@ -226,5 +226,18 @@ TEST(MaximumLikelihood, AnOrderFarTooHighEndsWithoutConvergenceOrWithHugeErrors)
   EXPECT_FALSE(fit.reason.empty());
 }
 
+// Nothing is left to fit; the command line once crashed on it.
+TEST(MaximumLikelihood, TakesAModelThatIsGivenWhole) {
+  FitOptions options;
+  options.poles = 1;
+  options.origin = 1;
+  options.static_gain = 2.0;
+  const Fit fit = fit_maximum_likelihood(
+      exact_response(ZerosPolesGain{{}, {0.0}, 2.0, 0.0}, log_grid(1.0, 100.0, 10)), options);
+  EXPECT_EQ(fit.free_parameters, 0);
+  EXPECT_TRUE(fit.converged);
+  EXPECT_NEAR(fit.model.num.front(), 2.0, 1e-12);
+}
+
 }  // namespace
 }  // namespace sinerig::identify

@@ -73,6 +73,28 @@ TEST(AskedFrequencies, OfASinglePointAreItsStart) {
   EXPECT_THAT(asked_frequencies(sweep), ElementsAre(1.0));
 }
 
+TEST(SubBands, AreSweepsOfTheirOwnThatShareTheirEdges) {
+  SweepSettings sweep = a_sweep();
+  sweep.points = 3;
+  sweep.sub_bands = equal_sub_bands(sweep, 2);
+  const auto asked = asked_of(sweep);
+  ASSERT_EQ(asked.size(), 5U);
+  const double wanted[] = {1.0, std::sqrt(10.0), 10.0, 10.0 * std::sqrt(10.0), 100.0};
+  for (std::size_t i = 0; i < 5; ++i) {
+    EXPECT_NEAR(asked[i].hz, wanted[i], 1e-12);
+    EXPECT_EQ(asked[i].sub_band, i < 3 ? 0U : 1U);
+  }
+}
+
+TEST(SubBands, ReachTheDwellsOfThePlan) {
+  SweepSettings sweep = a_sweep();
+  sweep.sub_bands = {{.start_hz = 1.0, .stop_hz = 5.0, .points = 4},
+                     {.start_hz = 20.0, .stop_hz = 40.0, .points = 6}};
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  ASSERT_EQ(plan.dwells.size(), 10U);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(plan.dwells[i].sub_band, i < 4 ? 0U : 1U);
+}
+
 TEST(Plan, RunsDownwardWhenTheStopIsBelowTheStart) {
   SweepSettings up = a_sweep();
   SweepSettings down = a_sweep();

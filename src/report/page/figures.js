@@ -20,8 +20,13 @@ function measured(values, band) {
   });
 }
 
-const modelled = values =>
-  shownResponses().flatMap(r => r.models.map(m => ({ f: m.f, y: values(m), line: 'model', jump: 0 })));
+const modelled = (values, low, high) =>
+  shownResponses().flatMap(r =>
+    r.models.flatMap(m => [
+      ...(m.gain95.length ? [{ f: m.f, low: low(m), high: high(m), neutral: true }] : []),
+      { f: m.f, y: values(m), line: 'model', jump: 0 },
+    ]),
+  );
 
 function statusLegend() {
   const present = [...new Set(shownResponses().flatMap(r => r.status))].filter(s => !plain(s));
@@ -46,7 +51,7 @@ function gainPlot() {
     title: () => 'Gain',
     log: () => !state.db,
     unit: () => (state.db ? 'dB re ' : 'times ') + sharedUnit(shownResponses()) + ', shaded: 95 % interval',
-    layers: () => modelled(gainOf).concat(measured(gainOf, { low: gainLow, high: gainHigh })),
+    layers: () => modelled(gainOf, gainLow, gainHigh).concat(measured(gainOf, { low: gainLow, high: gainHigh })),
     // A point drowned in noise may have an interval that reaches to nothing: it does not set the axis.
     clamp: (lo, hi, layers, f0, f1) => {
       const values = layers.filter(l => l.y).flatMap(l => l.y.filter((v, i) => l.f[i] >= f0 && l.f[i] <= f1));
@@ -74,12 +79,56 @@ function phasePlot() {
       (state.degrees ? 'degrees' : 'rad') + (state.wrapped ? ', within half a turn' : ', continuous'),
     layers: () => {
       const jump = state.wrapped ? inPhase(turn / 2) : undefined;
-      return modelled(phaseOf)
+      return modelled(phaseOf, shift(-1), shift(1))
         .map(l => ({ ...l, jump }))
         .concat(measured(phaseOf, { low: shift(-1), high: shift(1), jump }));
     },
     clamp: state.wrapped ? null : undefined,
   };
+}
+
+// Choe's method: the models of the sub-bands beside their mean, and the weight made of their spread.
+const spread = pick =>
+  shownResponses()
+    .filter(r => r.choe)
+    .flatMap(r =>
+      r.choe.bands.map((b, k) => ({
+        style: `--c:var(--s${k % 6})`,
+        f: r.choe.f,
+        y: pick(b),
+        line: 'full',
+      })),
+    );
+
+function choePlots(host) {
+  const choe = (id, title, unit, layers) =>
+    new Plot(host, { id, height: 240, log: true, title: () => title, unit, layers });
+  const unit = () => 'in ' + sharedUnit(shownResponses().filter(r => r.choe));
+  choe(
+    'choe-models',
+    'Models of the sub-bands',
+    () => unit() + '; black: nominal, their mean; points: measured',
+    () =>
+      spread(b => b.gain).concat(
+        shownResponses()
+          .filter(r => r.choe)
+          .flatMap(r => [
+            { f: r.choe.f, y: r.choe.nominal, line: 'model' },
+            { style: colour(r), f: r.f, y: r.abs, marks: true, status: r.status },
+          ]),
+      ),
+  );
+  choe(
+    'choe-weight',
+    'Additive uncertainty and weight',
+    () => unit() + '; lines: |model − nominal| of each sub-band; black: weight |Wₐ|, their largest',
+    () =>
+      spread(b => b.additive).concat(
+        shownResponses()
+          .filter(r => r.choe)
+          .map(r => ({ f: r.choe.f, y: r.choe.weight, line: 'model' })),
+      ),
+  );
 }
 
 // Residuals and differences: points against their interval around zero.

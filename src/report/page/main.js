@@ -116,6 +116,7 @@ function build() {
       loopPlots(bode);
       bode.insertAdjacentHTML('beforeend', marginsPanel());
     }
+    if (page.responses.some(r => r.choe)) choePlots(bode);
     new Nyquist(plane);
     for (const r of page.responses)
       for (const m of r.models) if (m.poles.length) new PoleZeroMap(plane, r, m);
