@@ -13,6 +13,12 @@
 
 namespace sinerig {
 
+// What people should know of a transport after it has been used for a while.
+struct Remark {
+  std::string text;
+  bool stops_a_sweep = false;
+};
+
 // The channels of one rig that one driver serves. Configured without touching anything, so that a
 // rig file can be checked and planned anywhere.
 class Device {
@@ -29,6 +35,9 @@ class Device {
 
   // Why the last command had a fault, for people; empty where there is nothing to say.
   virtual std::string fault_reason() const { return {}; }
+
+  // Exchanges, losses, obstacles so far; not for the loop.
+  virtual std::vector<Remark> remarks() const { return {}; }
 
   // Valid after open(). Null where the device has no actuator.
   virtual Actuator* actuator() noexcept = 0;

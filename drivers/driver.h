@@ -42,6 +42,9 @@ class Actuator {
 
   // Puts `command` (engineering unit) out and returns what was really applied, after clamping,
   // quantising or sigma-delta, and when. With a fault, `value` is what the device holds instead.
+  // Fault::stale: what was applied is not known this time (a lost confirmation); the sample is
+  // missing and the command counts as gone out. A device that answers late returns what it applied
+  // last, with its time. Every other fault is a command that was lost or late.
   virtual Sample write(double command) noexcept SINERIG_NONBLOCKING = 0;
 
   // Neutral output. Idempotent, callable from any exit path.

@@ -6,12 +6,12 @@ build_packages=(
   cmake ninja-build g++ pkg-config
   libeigen3-dev libspdlog-dev libgtest-dev libgmock-dev libbenchmark-dev
   libtomlplusplus-dev libcli11-dev libsqlite3-dev nlohmann-json3-dev
-  libmatio-dev librsvg2-dev
+  libmatio-dev librsvg2-dev libmodbus-dev
 )
 
 # What only tests need; without them the tests concerned are skipped and say so.
 test_packages=(
-  chromium fonts-dejavu-core octave python3-scipy python3-jsonschema
+  chromium fonts-dejavu-core octave python3-scipy python3-jsonschema python3-pymodbus
 )
 
 # usage TOOL : the comment at its head.

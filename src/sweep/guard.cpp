@@ -83,6 +83,7 @@ double Guard::ramp_down(std::uint64_t ticks) noexcept {
 }
 
 void Guard::observe_write(const Sample& applied, std::uint64_t tick) noexcept {
+  if (applied.fault == Fault::stale) return;
   write_faults_ = applied.fault == Fault::none ? 0 : write_faults_ + 1;
   if (settings_.max_write_faults != 0 && write_faults_ >= settings_.max_write_faults) {
     trip(TripCause::actuator_fault, 0, write_faults_, settings_.max_write_faults, tick);

@@ -160,7 +160,7 @@ void SweepRunner::exchange(double command, const Tick& tick) noexcept {
   const Sample applied = actuator_.write(command);
   guard_.observe_write(applied, tick.index);
   observe(0, applied);
-  command_lost_ = applied.fault != Fault::none;
+  command_lost_ = applied.fault != Fault::none && applied.fault != Fault::stale;
   if (command_lost_) {
     announce({.kind = EventKind::actuator_fault,
               .fault = applied.fault,
