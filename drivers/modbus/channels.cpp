@@ -122,13 +122,11 @@ Fault ModbusActuator::judge() noexcept {
   if (!link_.fresh()) return unknown_for_long();
   const Exchange& exchange = link_.newest();
   switch (exchange.fate) {
-    case CommandFate::confirmed: {
+    case CommandFate::confirmed:
       confirmed_ns_ = link_.tick_ns();
       held_.value = exchange.command;
       held_.time_ns = exchange.command_ns;
-      const std::int64_t waited_ns = exchange.begun_ns - exchange.handed_over_ns;
-      return 2 * waited_ns > link_.settings().period_ns ? Fault::timeout : Fault::none;
-    }
+      return Fault::none;
     case CommandFate::none:
     case CommandFate::unconfirmed: return unknown_for_long();
     case CommandFate::refused:

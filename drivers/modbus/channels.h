@@ -52,8 +52,8 @@ class ModbusActuator final : public Actuator {
 
   // Hands the set-point over and returns what the exchange before has applied, and when.
   // Fault::stale: not known, no answer that can be believed. Fault::timeout: not known for longer
-  // than allowed, or applied too late. Fault::bus: refused, or no connection, or the health of the
-  // device is not what it must be.
+  // than allowed, or never sent because the exchange before took a whole period. Fault::bus:
+  // refused, or no connection, or the health of the device is not what it must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
   void release() noexcept override;

@@ -173,6 +173,8 @@ Answer Transport::ask(const Request& request, std::int64_t deadline_ns,
   ++counters_.asked;
   answer.doubtful = settle_doubt();
   const RequestBytes bytes = bytes_of(request);
+  // On a serial line libmodbus drops, before it looks at their check sum, frames of other devices.
+  if (settings_.serial) modbus_set_slave(context_.get(), request.unit);
   answer.sent_ns = monotonic_now_ns();
   if (!send(bytes)) {
     answer.error = errno;

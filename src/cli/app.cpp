@@ -23,6 +23,7 @@ constexpr const char* description =
     "time, over the bus it already has; or of a simulated plant, in no time.\n"
     "\n"
     "  sinerig plan config/gimbal.toml     what would be run, and for how long; nothing moves\n"
+    "  sinerig check config/gimbal.toml    reads every channel for a while; nothing moves\n"
     "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
@@ -182,6 +183,16 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
       "plan", "Print every dwell of a rig file and the total duration; refuse what can't be run");
   plan->add_option("RIG", rig, "rig file (TOML)")->required();
 
+  double check_seconds = 3.0;
+  CLI::App* check = app.add_subcommand(
+      "check",
+      "Open a rig and read every channel without moving anything: rate, age, jitter, losses, and "
+      "what would stop a sweep");
+  check->add_option("RIG", rig, "rig file (TOML)")->required();
+  check->add_option("--seconds", check_seconds, "how long")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+
   CLI::App* run = app.add_subcommand("run", "Run the sweep of a rig file and write a sweep file");
   run->add_option("RIG", run_options.rig, "rig file (TOML)")->required();
   run->add_option(
@@ -269,6 +280,7 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
 
   try {
     if (plan->parsed()) return plan_command(rig, drivers);
+    if (check->parsed()) return check_command(rig, check_seconds, drivers);
     if (run->parsed()) return run_command(run_options, drivers);
     if (show->parsed()) return show_command(file);
     if (exporter->parsed()) return export_command(export_options);

@@ -50,6 +50,7 @@ struct CompareOptions {
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
 int plan_command(const std::string& rig, const std::vector<DriverKit>& drivers);
+int check_command(const std::string& rig, double seconds, const std::vector<DriverKit>& drivers);
 int show_command(const std::string& file);
 int export_command(const ExportOptions& options);
 int report_command(const ReportOptions& options);

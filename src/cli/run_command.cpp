@@ -192,7 +192,9 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const RunOutcome outcome = play(runner, control, outbox, writer, progress);
 
   std::string reason = outcome.trip.tripped() ? describe(outcome.trip, rig.sensor_names()) : "";
-  if (outcome.trip.cause == TripCause::actuator_fault && !configured.fault_reason().empty())
+  const bool a_device_failed = outcome.trip.cause == TripCause::actuator_fault ||
+                               outcome.trip.cause == TripCause::channel_age;
+  if (a_device_failed && !configured.fault_reason().empty())
     reason += ": " + configured.fault_reason();
   writer.set("outcome", outcome_name(outcome));
   writer.set("outcome_detail", reason);

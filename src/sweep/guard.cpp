@@ -135,7 +135,7 @@ void Guard::trip(TripCause cause, std::uint32_t channel, double value, double li
   changed_ = false;
 }
 
-std::string describe(const Trip& trip, const std::vector<std::string>& channel_names) {
+std::string describe_cause(const Trip& trip, const std::vector<std::string>& channel_names) {
   const std::string name =
       trip.channel < channel_names.size() ? channel_names[trip.channel] : "what was applied";
   const auto with = [&](const char* format, double a, double b) {
@@ -193,8 +193,16 @@ std::string describe(const Trip& trip, const std::vector<std::string>& channel_n
       what = with("the loop stood still for %.3g s (at most %.3g s)", trip.value, trip.limit);
       break;
   }
-  return what + with(" (tick %.0f; command changed to %.6g)", static_cast<double>(trip.tick),
-                     trip.command);
+  return what;
+}
+
+std::string describe(const Trip& trip, const std::vector<std::string>& channel_names) {
+  const std::string cause = describe_cause(trip, channel_names);
+  if (!trip.tripped()) return cause;
+  char where[80];
+  std::snprintf(where, sizeof where, " (tick %.0f; command changed to %.6g)",
+                static_cast<double>(trip.tick), trip.command);
+  return cause + where;
 }
 
 }  // namespace sinerig

@@ -5,6 +5,9 @@
 
 #include "config/rig.h"
 #include "drivers/can/can_driver.h"
+#ifdef SINERIG_HAS_MODBUS
+#include "drivers/modbus/modbus_driver.h"
+#endif
 #include "sim/sim_driver.h"
 
 namespace {
@@ -22,7 +25,13 @@ void configure(const config::Rig& rig, const DriverKit& driver) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static const std::vector<DriverKit> drivers{sim::sim_driver(), can::can_driver()};
+  static const std::vector<DriverKit> drivers{
+      sim::sim_driver(),
+      can::can_driver(),
+#ifdef SINERIG_HAS_MODBUS
+      modbus::modbus_driver(),
+#endif
+  };
   try {
     auto file =
         config::RigFile::parse({reinterpret_cast<const char*>(data), size}, "/nowhere/rig.toml");
