@@ -17,6 +17,7 @@ enum class Fault : std::uint8_t {
   timeout,  // the device did not answer in time
   bus,      // the transport failed (bus-off, full queue, checksum, exception reply)
   range,    // the device says that the value left what it can represent
+  device,   // the device says that it has failed or no longer obeys; after a write, a reason to stop
 };
 
 inline constexpr const char* to_string(Fault fault) noexcept {
@@ -26,6 +27,7 @@ inline constexpr const char* to_string(Fault fault) noexcept {
     case Fault::timeout: return "timeout";
     case Fault::bus: return "bus";
     case Fault::range: return "range";
+    case Fault::device: return "device";
   }
   return "unknown";
 }

@@ -11,7 +11,7 @@ build_packages=(
 
 # What only tests need; without them the tests concerned are skipped and say so.
 test_packages=(
-  chromium fonts-dejavu-core octave python3-scipy python3-jsonschema python3-pymodbus
+  chromium fonts-dejavu-core octave python3-scipy python3-jsonschema python3-pymodbus python3-serial-asyncio
 )
 
 # usage TOOL : the comment at its head.

@@ -105,7 +105,7 @@ Sample ModbusActuator::write(double command) noexcept {
       std::clamp(a_number ? command : settings_.neutral, settings_.minimum, settings_.maximum));
   last_fault_ = judge();
   look_after_health();
-  if (violated_ != no_rule) last_fault_ = Fault::bus;
+  if (violated_ != no_rule) last_fault_ = Fault::device;
   if (!a_number) last_fault_ = Fault::range;
   Sample answer = held_;
   answer.fault = last_fault_;
@@ -144,7 +144,10 @@ void ModbusActuator::look_after_health() noexcept {
         settings_.max_age_ns > 0 && link_.tick_ns() - health_[n].time_ns > settings_.max_age_ns;
     const bool bad = health_[n].fault == Fault::none &&
                      !settings_.health[n].comparison.holds(health_[n].value);
-    if (violated_ == no_rule && (bad || unknown)) violated_ = n;
+    if (violated_ == no_rule && (bad || unknown)) {
+      violated_ = n;
+      health_is_old_ = !bad;
+    }
   }
 }
 
@@ -156,15 +159,13 @@ void ModbusActuator::release() noexcept {
 
 std::string ModbusActuator::reason() const {
   if (violated_ != no_rule) {
-    const Sample& reading = health_[violated_];
     const HealthRule& rule = settings_.health[violated_];
     std::ostringstream text;
     text << rule.name;
-    if (reading.fault == Fault::none) text << " is " << reading.value;
-    text << (reading.fault == Fault::none ? ", must be " : " could not be read, must be ")
-         << rule.comparison.text();
-    const std::string failure = link_.last_failure();
-    if (reading.fault != Fault::none && !failure.empty()) text << " (" << failure << ")";
+    if (health_is_old_)
+      text << " could not be read: " << link_.last_failure();
+    else
+      text << " is " << health_[violated_].value << ", must be " << rule.comparison.text();
     return text.str();
   }
   const std::string failure = link_.last_failure();

@@ -53,7 +53,7 @@ class ModbusActuator final : public Actuator {
   // Hands the set-point over and returns what the exchange before has applied, and when.
   // Fault::stale: not known, no answer that can be believed. Fault::timeout: not known for longer
   // than allowed, or never sent because the exchange before took a whole period. Fault::bus:
-  // refused, or no connection, or the health of the device is not what it must be.
+  // refused, or no connection. Fault::device: its health is not what it must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
   void release() noexcept override;
@@ -71,6 +71,7 @@ class ModbusActuator final : public Actuator {
   std::vector<std::size_t> health_fields_;
   std::vector<Sample> health_;  // newest good reading of each rule
   std::size_t violated_;        // index, or none
+  bool health_is_old_ = false;  // and that is what is wrong with it
   Sample held_;
   Fault last_fault_ = Fault::none;
   std::int64_t confirmed_ns_ = 0;

@@ -109,7 +109,6 @@ void Drive::stop(State state, std::uint16_t error, std::int64_t time_ns) {
   state_ = state;
   error_ = error;
   motor_.apply(0.0, time_ns);
-  registers_.fill(0);
 }
 
 void Drive::watch(std::int64_t now_ns) {

@@ -34,7 +34,10 @@ class Drive {
 
   void watch(std::int64_t now_ns);  // trips when requests have ceased
   void trip(std::int64_t now_ns) { stop(tripped, failed, now_ns); }
-  void switch_off(std::int64_t now_ns) { stop(off, 0, now_ns); }
+  void lose_power(std::int64_t now_ns) {
+    stop(off, none, now_ns);
+    registers_.fill(0);
+  }
 
   double torque() const { return motor_.torque(); }
   bool on() const { return state_ == State::on_; }

@@ -94,7 +94,7 @@ void DriveServer::cause_faults(std::int64_t now_ns) {
     cycled_ = true;
     booting_ = true;
     booted_ns_ = now_ns + boot_ns;
-    drive_.switch_off(now_ns);
+    drive_.lose_power(now_ns);
     line_->set_open(false);
     line_->drop();
     replies_.clear();

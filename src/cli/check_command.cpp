@@ -59,7 +59,7 @@ void print_channels(const RigCheck& check, const config::Rig& rig) {
       print("%.6g %s\n", channel.last_value, rig.sensors[i].unit.c_str());
     else
       print("none\n");
-    for (const Fault fault : {Fault::timeout, Fault::bus, Fault::range}) {
+    for (const Fault fault : {Fault::timeout, Fault::bus, Fault::range, Fault::device}) {
       if (channel.faulty(fault) == 0) continue;
       print("%-14s %llu of %llu readings had the fault \"%s\"\n", "",
             static_cast<unsigned long long>(channel.faulty(fault)),

@@ -84,6 +84,7 @@ double Guard::ramp_down(std::uint64_t ticks) noexcept {
 
 void Guard::observe_write(const Sample& applied, std::uint64_t tick) noexcept {
   if (applied.fault == Fault::stale) return;
+  if (applied.fault == Fault::device) trip(TripCause::actuator_fault, 0, 0.0, 0.0, tick);
   write_faults_ = applied.fault == Fault::none ? 0 : write_faults_ + 1;
   if (settings_.max_write_faults != 0 && write_faults_ >= settings_.max_write_faults) {
     trip(TripCause::actuator_fault, 0, write_faults_, settings_.max_write_faults, tick);
@@ -167,8 +168,8 @@ std::string describe_cause(const Trip& trip, const std::vector<std::string>& cha
                          trip.limit);
       break;
     case TripCause::actuator_fault:
-      what =
-          with("%.0f faulty writes to the actuator in a row (limit %.0f)", trip.value, trip.limit);
+      what = trip.limit == 0.0 ? "the actuator reports a fault"
+                               : with("%.0f faulty writes to the actuator in a row (limit %.0f)", trip.value, trip.limit);
       break;
     case TripCause::excitation_missing:
       what = name + with(

@@ -9,6 +9,9 @@
 #include <gmock/gmock.h>
 
 #include "drivers/can/can_driver.h"
+#ifdef SINERIG_HAS_MODBUS
+#include "drivers/modbus/modbus_driver.h"
+#endif
 #include "support/exactness.h"
 #include "support/rig_text.h"
 
@@ -25,8 +28,15 @@ std::vector<std::string> shipped_files() {
   for (const auto& entry : std::filesystem::directory_iterator{shipped("")}) {
     const std::string path = entry.path().string();
     // What describes a simulated device beside a rig has no loop.
-    const bool rig = path.ends_with(".toml") && text_of(path).find("[loop]") != std::string::npos;
-    if (rig) paths.push_back(path);
+    if (!path.ends_with(".toml")) continue;
+    const std::string text = text_of(path);
+    const bool rig = text.find("[loop]") != std::string::npos;
+#ifdef SINERIG_HAS_MODBUS
+    const bool has_driver = true;
+#else
+    const bool has_driver = text.find("driver = \"modbus\"") == std::string::npos;
+#endif
+    if (rig && has_driver) paths.push_back(path);
   }
   std::sort(paths.begin(), paths.end());
   return paths;
@@ -42,7 +52,13 @@ TEST(ShippedFiles, HoldAtLeastTheFourThatTheManualNames) {
 }
 
 std::vector<DriverKit> drivers() {
-  return {sim::sim_driver(), can::can_driver()};
+  return {
+      sim::sim_driver(),
+      can::can_driver(),
+#ifdef SINERIG_HAS_MODBUS
+      modbus::modbus_driver(),
+#endif
+  };
 }
 
 class ShippedFile : public testing::TestWithParam<std::string> {};
@@ -97,7 +113,8 @@ void collect_documented(const std::string& text, std::set<std::string>& document
   while (std::getline(lines, line)) {
     std::smatch match;
     if (std::regex_search(line, match, header)) {
-      section = match[1].str() == "sensor" ? "sensor.NAME" : match[1].str() + match[2].str();
+      const bool named = match[1].str() == "sensor" || match[1].str() == "modbus";
+      section = named ? match[1].str() + ".NAME" : match[1].str() + match[2].str();
       documented.insert(section);
     } else if (std::regex_search(line, match, entry)) {
       documented.insert(section + "." + match[1].str());
