@@ -16,6 +16,7 @@ namespace sinerig::modbus {
 namespace {
 
 constexpr std::int64_t opening_ns = 500'000'000;
+constexpr std::uint16_t most_spare = 3;
 constexpr std::int64_t release_answer_ns = 100'000'000;
 constexpr int release_tries = 3;
 
@@ -56,6 +57,37 @@ void Link::make_plans() {
       ExchangePlan::make(places_, nullptr, settings_.writing, settings_.read_through);
   commanding_plan_ = ExchangePlan::make(places_, command_ ? &*command_ : nullptr,
                                         settings_.writing, settings_.read_through);
+  for (ExchangePlan* plan : {&reading_plan_, &commanding_plan_}) {
+    for (Request& question : plan->questions) {
+      const auto found = std::ranges::find_if(spares_, [&](const Request& known) {
+        const bool same_table = (known.function == Function::read_input) ==
+                                (question.function == Function::read_input);
+        return known.unit == question.unit && same_table &&
+               known.read_address == question.read_address &&
+               known.read_count == question.read_count;
+      });
+      if (found != spares_.end()) question.spare = found->spare;
+    }
+  }
+}
+
+// Serial lines: how many registers more than wanted each question may ask for.
+void Link::find_spare_registers() {
+  if (!settings_.connection.serial) return;
+  spares_ = reading_plan_.questions;
+  for (Request& question : spares_) {
+    while (question.spare < most_spare) {
+      Request longer = question;
+      longer.spare = 0;
+      longer.read_count = static_cast<std::uint16_t>(question.read_count + question.spare + 1);
+      if (longer.read_count > max_read_registers) break;
+      const Answer answer =
+          transport_.ask(longer, monotonic_now_ns() + opening_ns, registers_);
+      if (answer.outcome != Outcome::ok) break;
+      ++question.spare;
+    }
+  }
+  make_plans();
 }
 
 void Link::open() {
@@ -75,6 +107,7 @@ void Link::open() {
                                " of unit " + std::to_string(places_[n].unit) + " at " +
                                transport_.describe(answer));
   }
+  find_spare_registers();
   wake_ = eventfd(0, EFD_CLOEXEC);
   if (wake_ < 0)
     throw std::runtime_error(std::string{"no eventfd for the Modbus thread: "} +
@@ -129,15 +162,19 @@ void Link::perform(const Order& order, Exchange& exchange) noexcept {
   const ExchangePlan& plan = order.commands ? commanding_plan_ : reading_plan_;
   const std::int64_t deadline_ns = exchange.begun_ns + settings_.response_timeout_ns;
   bool failed = false;
+  ++asked_;
   for (std::size_t n = 0; n < plan.questions.size() && !(too_old && order.commands); ++n) {
     Request question = plan.questions[n];
+    if (question.spare > 0)
+      question.read_count = static_cast<std::uint16_t>(question.read_count +
+                                                       asked_ % (question.spare + 1U));
     if (question.writes())
       exchange.command = encode(question.words, command_->format, order.command);
     const Answer answer = transport_.ask(question, deadline_ns, registers_);
     if (question.writes()) {
       exchange.command_ns = answer.time_ns;
-      const bool believed = answer.outcome == Outcome::ok && !answer.doubtful;
-      exchange.fate = believed                                   ? CommandFate::confirmed
+      const bool taken = answer.outcome == Outcome::ok;
+      exchange.fate = taken                                      ? CommandFate::confirmed
                       : answer.outcome == Outcome::exception     ? CommandFate::refused
                       : answer.outcome == Outcome::disconnected ? CommandFate::not_sent
                                                                  : CommandFate::unconfirmed;
@@ -155,7 +192,8 @@ void Link::perform(const Order& order, Exchange& exchange) noexcept {
       sample.time_ns = answer.time_ns;
       sample.fault = fault_of(answer.outcome);
       if (answer.outcome != Outcome::ok) continue;
-      sample.fault = answer.doubtful ? Fault::stale : Fault::none;
+      sample.fault = answer.write_only ? Fault::stale : Fault::none;
+      if (answer.write_only) continue;
       sample.value = decode(std::span{registers_}.subspan(field.offset), field.format);
     }
     if (!transport_.connected()) break;

@@ -96,6 +96,7 @@ class Link {
   void perform(const Order& order, Exchange& exchange) noexcept;
   bool put(const Request& question, const Answer& answer, Exchange& exchange) noexcept;
   void make_plans();
+  void find_spare_registers();
   void note_duration(const Exchange& exchange, bool failed) noexcept;
   void reconnect_now_and_then() noexcept;
   Pace summary(std::vector<std::int64_t> durations, std::size_t failed) const;
@@ -121,6 +122,8 @@ class Link {
   // Whoever holds the mutex: the thread for an exchange, others between them.
   mutable std::mutex mutex_;
   Transport transport_;
+  std::vector<Request> spares_;  // what was found out about what can be read beyond what is wanted
+  std::uint64_t asked_ = 0;
   ExchangePlan reading_plan_;
   ExchangePlan commanding_plan_;
   std::array<std::uint16_t, max_read_registers> registers_{};

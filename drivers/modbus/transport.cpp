@@ -25,6 +25,9 @@ constexpr std::uint32_t connect_timeout_us = 300'000;
 constexpr std::int64_t echo_wait_ns = 300'000'000;
 constexpr std::int64_t echo_quiet_ns = 50'000'000;
 
+// An answer that is this many time-outs late is taken for lost.
+constexpr std::int64_t latest_answer = 5;
+
 // libmodbus takes a timeout of 0 for a mistake, and one of a second or more in two parts.
 void set_response_timeout(modbus_t* context, std::int64_t timeout_ns) noexcept {
   const std::int64_t us = std::max<std::int64_t>(1, timeout_ns / 1000);
@@ -92,8 +95,7 @@ bool Transport::try_connect() noexcept {
     }
   }
   connected_ = true;
-  in_doubt_ = settings_.serial;  // whoever spoke before may still be answered
-  last_was_good_ = false;
+  late_.fill({});
   ++counters_.connections;
   return true;
 }
@@ -132,19 +134,36 @@ void Transport::clear_input() noexcept {
   }
 }
 
-// Serial frames have no number: after a time-out the next answer may be the late one. It is
-// believed again once a whole exchange has passed with one answer and nothing behind it. True:
-// still in doubt.
-bool Transport::settle_doubt() noexcept {
-  if (!settings_.serial) return false;
-  if (pending() > 0) {
-    clear_input();
-    ++counters_.late_answers;
-    in_doubt_ = true;
-  } else if (last_was_good_) {
-    in_doubt_ = false;
+void Transport::take_in_late_answers() noexcept {
+  if (!settings_.serial || pending() == 0) return;
+  clear_input();
+  ++counters_.late_answers;
+  const std::int64_t now_ns = monotonic_now_ns();
+  const auto due = [&](const Late& late) { return late.until_ns > now_ns; };
+  if (std::ranges::count_if(late_, due) == 1) late_.fill({});
+}
+
+bool Transport::could_be_mistaken(const Request& request) const noexcept {
+  const std::int64_t now_ns = monotonic_now_ns();
+  return request.reads() && std::ranges::any_of(late_, [&](const Late& late) {
+           return late.until_ns > now_ns && late.size == reply_size(request) &&
+                  late.function == static_cast<std::uint8_t>(request.function);
+         });
+}
+
+void Transport::expect_late(const Request& request, std::int64_t until_ns) noexcept {
+  Late& oldest = *std::ranges::min_element(late_, {}, &Late::until_ns);
+  oldest = {.function = static_cast<std::uint8_t>(request.function),
+            .size = reply_size(request),
+            .until_ns = until_ns};
+}
+
+void Transport::forget_late(std::span<const std::uint8_t> pdu) noexcept {
+  for (Late& late : late_) {
+    if (late.until_ns == 0 || late.size != pdu.size() || late.function != pdu[0]) continue;
+    late = {};
+    return;
   }
-  return in_doubt_;
 }
 
 bool Transport::send(const RequestBytes& request) noexcept {
@@ -163,15 +182,24 @@ bool Transport::send(const RequestBytes& request) noexcept {
          static_cast<ssize_t>(size);
 }
 
-Answer Transport::ask(const Request& request, std::int64_t deadline_ns,
+Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
                       std::span<std::uint16_t> registers) noexcept {
   Answer answer;
   if (!connected_) {
     answer.error = ENOTCONN;
     return answer;
   }
+  Request request = wanted;
+  take_in_late_answers();
+  if (could_be_mistaken(request)) {
+    answer.outcome = Outcome::timeout;
+    if (!request.writes()) return answer;
+    answer.write_only = true;
+    request.function = Function::write_multiple;
+    request.read_count = 0;
+  }
   ++counters_.asked;
-  answer.doubtful = settle_doubt();
+  const std::int64_t patience_ns = deadline_ns - monotonic_now_ns();
   const RequestBytes bytes = bytes_of(request);
   // On a serial line libmodbus drops, before it looks at their check sum, frames of other devices.
   if (settings_.serial) modbus_set_slave(context_.get(), request.unit);
@@ -194,9 +222,11 @@ Answer Transport::ask(const Request& request, std::int64_t deadline_ns,
   answer.time_ns = on_a_wire ? earliest_ns + (latest_ns - earliest_ns) / 2
                              : answer.sent_ns + (answer.received_ns - answer.sent_ns) / 2;
 
-  last_was_good_ = answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
-  if (!last_was_good_) in_doubt_ = settings_.serial;
-  if (last_was_good_ && answer.doubtful) ++counters_.doubtful;
+  const bool answered =
+      answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
+  if (settings_.serial && !answered)
+    expect_late(request,
+                answer.received_ns + latest_answer * std::max<std::int64_t>(0, patience_ns));
   if (answer.outcome == Outcome::timeout) ++counters_.timeouts;
   if (answer.outcome == Outcome::exception) ++counters_.exceptions;
   if (answer.outcome == Outcome::spoiled) {
@@ -230,11 +260,11 @@ void Transport::receive(const Request& request, std::int64_t deadline_ns,
     const bool ours = settings_.serial
                           ? frame[0] == request.unit
                           : (frame[0] << 8U | frame[1]) == transaction_;
-    const Reply reply =
-        ours ? read_reply({frame.data() + header, size - header - trailer}, request, registers)
-             : Reply{};
+    const std::span<const std::uint8_t> pdu{frame.data() + header, size - header - trailer};
+    const Reply reply = ours ? read_reply(pdu, request, registers) : Reply{};
     if (reply.kind == ReplyKind::other) {
       ++counters_.late_answers;
+      forget_late(pdu);
       continue;
     }
     answer.exception = reply.exception;
@@ -278,7 +308,7 @@ void Transport::look_for_echo(const Request& request) noexcept {
     std::array<std::uint8_t, 64> rest{};
     if (read(socket(), rest.data(), rest.size()) <= 0) break;
   }
-  in_doubt_ = false;
+  late_.fill({});
 }
 
 std::string Transport::describe(const Answer& answer) const {

@@ -1,6 +1,9 @@
 // One connection, TCP or serial line, and one question at a time on it, answered by a deadline.
 // Answers that come after theirs are recognised and dropped: taken for the next answer they would
-// make every later sample one period old, which looks like a clean phase lag.
+// make every later sample one period old, which looks like a clean phase lag. TCP frames have a
+// number. Serial frames have none: there answers are told apart by their length, where the device
+// lets more be read than is wanted; elsewhere nothing is read, after a time-out, until the late answer
+// has come or can no longer come. Set-points go out meanwhile.
 //
 // Not thread-safe. Nothing in it is for the loop.
 #pragma once
@@ -45,7 +48,7 @@ enum class Outcome : std::uint8_t {
 struct Answer {
   Outcome outcome = Outcome::disconnected;
   std::uint8_t exception = 0;
-  bool doubtful = false;  // may be the late answer to the question before
+  bool write_only = false;  // nothing was read: a late answer may still be under way
   int error = 0;          // errno of libmodbus
   std::int64_t sent_ns = 0;
   std::int64_t received_ns = 0;
@@ -59,7 +62,6 @@ struct TransportCounters {
   std::uint64_t spoiled = 0;
   std::uint64_t exceptions = 0;
   std::uint64_t connections = 0;
-  std::uint64_t doubtful = 0;  // answers dropped because they may have been late ones
 };
 
 class Transport {
@@ -100,7 +102,10 @@ class Transport {
   void receive(const Request& request, std::int64_t deadline_ns, std::span<std::uint16_t> registers,
                Answer& answer) noexcept;
   bool discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept;
-  bool settle_doubt() noexcept;
+  void take_in_late_answers() noexcept;
+  bool could_be_mistaken(const Request& request) const noexcept;
+  void expect_late(const Request& request, std::int64_t until_ns) noexcept;
+  void forget_late(std::span<const std::uint8_t> pdu) noexcept;
   void clear_input() noexcept;
   int pending() const noexcept;
   int socket() const noexcept;
@@ -111,8 +116,14 @@ class Transport {
   std::uint16_t transaction_ = 0;
   bool connected_ = false;
   bool echoes_ = false;
-  bool in_doubt_ = false;      // serial: an answer may still be under way
-  bool last_was_good_ = false;
+
+  // Serial: answers that may still come, by what tells them apart.
+  struct Late {
+    std::uint8_t function = 0;
+    std::size_t size = 0;
+    std::int64_t until_ns = 0;
+  };
+  std::array<Late, 8> late_{};
 };
 
 }  // namespace sinerig::modbus

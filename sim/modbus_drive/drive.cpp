@@ -130,7 +130,7 @@ std::uint8_t Drive::write(std::size_t first, std::span<const std::uint8_t> words
     registers_[first + n] = static_cast<std::uint16_t>(word(words, 2 * n));
   if (first == control_at) {
     if (registers_[control_at] > 2) return illegal_value;
-    if (registers_[control_at] == 0) stop(off, error_, time_ns);
+    if (registers_[control_at] == 0) stop(state_ == tripped ? tripped : off, error_, time_ns);
     if (registers_[control_at] == 1 && state_ == off) state_ = on_;
     if (registers_[control_at] == 2 && state_ == tripped) stop(off, none, time_ns);
     return 0;

@@ -160,8 +160,17 @@ TEST(EveryKeyThatIsRead, IsExplainedInTheShippedFiles) {
     read(path);
   }
   EXPECT_GT(known.size(), 60U);
-  for (const std::string& key : known) {
-    EXPECT_TRUE(documented.contains(key)) << key << " is explained in no file of config/";
+  for (std::string key : known) {
+    // A step of a list is the same in all lists, and its number the same as that of a channel.
+    key = std::regex_replace(key, std::regex{R"(^actuator\.(startup|disarm|shutdown)\.)"},
+                             "actuator.arm.");
+    const std::string number = std::regex_replace(
+        key, std::regex{R"(^actuator\.(arm|health)\.(type|word_order|byte_order|scale|offset|unit_id)$)"},
+        "actuator.$2");
+    const std::string table =
+        std::regex_replace(number, std::regex{R"(^actuator\.(arm|health)\.table$)"}, "sensor.NAME.table");
+    const std::string place = std::regex_replace(table, std::regex{R"(^sensor\.NAME\.(word_order|byte_order|scale|offset|unit_id)$)"}, "actuator.$1");
+    EXPECT_TRUE(documented.contains(key) || documented.contains(place)) << key << " is explained in no file of config/";
   }
 }
 
