@@ -17,7 +17,7 @@ enum class Fault : std::uint8_t {
   timeout,  // the device did not answer in time
   bus,      // the transport failed (bus-off, full queue, checksum, exception reply)
   range,    // the device says that the value left what it can represent
-  device,   // the device says that it has failed or no longer obeys; after a write, a reason to stop
+  device,  // the device says that it has failed or no longer obeys; after a write, a reason to stop
 };
 
 inline constexpr const char* to_string(Fault fault) noexcept {

@@ -31,8 +31,8 @@ std::string obstacle(const Link& link, const Pace& pace) {
   std::ostringstream text;
   if (pace.exchanges == 0 || static_cast<double>(pace.failed) >
                                  largest_failed_part * static_cast<double>(pace.exchanges)) {
-    text << where << pace.failed << " of " << pace.exchanges << " exchanges failed: "
-         << link.last_failure();
+    text << where << pace.failed << " of " << pace.exchanges
+         << " exchanges failed: " << link.last_failure();
     return text.str();
   }
   const double allowed_ns = largest_part_of_period * static_cast<double>(settings.period_ns);
@@ -41,10 +41,9 @@ std::string obstacle(const Link& link, const Pace& pace) {
   const double rate_hz = 1e9 / static_cast<double>(settings.period_ns);
   text.precision(4);
   text << where << settings.connection.address() << ": an exchange takes "
-       << milliseconds(pace.median_ns) << ", one in twenty more than "
-       << milliseconds(pace.slow_ns) << "; the loop at " << rate_hz << " Hz needs one every "
-       << milliseconds(settings.period_ns) << ": set [loop] rate_hz to " << std::floor(most_hz)
-       << " at most";
+       << milliseconds(pace.median_ns) << ", one in twenty more than " << milliseconds(pace.slow_ns)
+       << "; the loop at " << rate_hz << " Hz needs one every " << milliseconds(settings.period_ns)
+       << ": set [loop] rate_hz to " << std::floor(most_hz) << " at most";
   return text.str();
 }
 
@@ -72,9 +71,7 @@ ModbusActuator::~ModbusActuator() {
 
 void ModbusActuator::start() {
   started_ = true;
-  link_.idle([&](Transport& transport) {
-    run(transport, settings_.startup, "start-up");
-  });
+  link_.idle([&](Transport& transport) { run(transport, settings_.startup, "start-up"); });
 }
 
 // Neutral goes out before the drive is armed: one that finds a stale set-point would jump. A drive
@@ -94,7 +91,8 @@ void ModbusActuator::arm() {
   }
   link_.set_commanded(true);
   confirmed_ns_ = monotonic_now_ns();
-  for (Sample& reading : health_) reading = {.value = 0.0, .time_ns = confirmed_ns_, .fault = Fault::stale};
+  for (Sample& reading : health_)
+    reading = {.value = 0.0, .time_ns = confirmed_ns_, .fault = Fault::stale};
 }
 
 Sample ModbusActuator::write(double command) noexcept {
@@ -142,8 +140,8 @@ void ModbusActuator::look_after_health() noexcept {
     if (link_.fresh() && reading.fault == Fault::none) health_[n] = reading;
     const bool unknown =
         settings_.max_age_ns > 0 && link_.tick_ns() - health_[n].time_ns > settings_.max_age_ns;
-    const bool bad = health_[n].fault == Fault::none &&
-                     !settings_.health[n].comparison.holds(health_[n].value);
+    const bool bad =
+        health_[n].fault == Fault::none && !settings_.health[n].comparison.holds(health_[n].value);
     if (violated_ == no_rule && (bad || unknown)) {
       violated_ = n;
       health_is_old_ = !bad;

@@ -8,7 +8,9 @@
 namespace sinerig::modbus {
 namespace {
 
-std::size_t end_of(const Place& place) noexcept { return place.address + place.words(); }
+std::size_t end_of(const Place& place) noexcept {
+  return place.address + place.words();
+}
 
 bool joins(const Request& question, const Place& place, std::size_t read_through) noexcept {
   const Function function =
@@ -23,8 +25,7 @@ bool joins(const Request& question, const Place& place, std::size_t read_through
 Request reading(const Place& place) {
   Request question;
   question.unit = place.unit;
-  question.function =
-      place.table == Table::holding ? Function::read_holding : Function::read_input;
+  question.function = place.table == Table::holding ? Function::read_holding : Function::read_input;
   question.read_address = place.address;
   question.read_count = static_cast<std::uint16_t>(place.words());
   return question;

@@ -17,6 +17,11 @@ namespace {
 
 constexpr std::int64_t opening_ns = 500'000'000;
 constexpr std::uint16_t most_spare = 3;
+
+// A trial waits for slow answers, to tell how slow they are, but not for a device that says
+// nothing.
+constexpr std::int64_t trial_ns = 200'000'000;
+constexpr std::size_t most_failures = 12;
 constexpr std::int64_t release_answer_ns = 100'000'000;
 constexpr int release_tries = 3;
 
@@ -53,15 +58,14 @@ std::size_t Link::watch(const Place& place, std::string label) {
 }
 
 void Link::make_plans() {
-  reading_plan_ =
-      ExchangePlan::make(places_, nullptr, settings_.writing, settings_.read_through);
-  commanding_plan_ = ExchangePlan::make(places_, command_ ? &*command_ : nullptr,
-                                        settings_.writing, settings_.read_through);
+  reading_plan_ = ExchangePlan::make(places_, nullptr, settings_.writing, settings_.read_through);
+  commanding_plan_ = ExchangePlan::make(places_, command_ ? &*command_ : nullptr, settings_.writing,
+                                        settings_.read_through);
   for (ExchangePlan* plan : {&reading_plan_, &commanding_plan_}) {
     for (Request& question : plan->questions) {
       const auto found = std::ranges::find_if(spares_, [&](const Request& known) {
-        const bool same_table = (known.function == Function::read_input) ==
-                                (question.function == Function::read_input);
+        const bool same_table =
+            (known.function == Function::read_input) == (question.function == Function::read_input);
         return known.unit == question.unit && same_table &&
                known.read_address == question.read_address &&
                known.read_count == question.read_count;
@@ -81,8 +85,7 @@ void Link::find_spare_registers() {
       longer.spare = 0;
       longer.read_count = static_cast<std::uint16_t>(question.read_count + question.spare + 1);
       if (longer.read_count > max_read_registers) break;
-      const Answer answer =
-          transport_.ask(longer, monotonic_now_ns() + opening_ns, registers_);
+      const Answer answer = transport_.ask(longer, monotonic_now_ns() + opening_ns, registers_);
       if (answer.outcome != Outcome::ok) break;
       ++question.spare;
     }
@@ -137,7 +140,7 @@ void Link::serve_one() noexcept {
   Order order;
   if (!orders_.take(order)) return;
   Exchange exchange;
-  perform(order, exchange);
+  perform(order, settings_.response_timeout_ns, exchange);
   results_.put(exchange);
   if (!transport_.connected()) reconnect_now_and_then();
 }
@@ -151,7 +154,7 @@ void Link::reconnect_now_and_then() noexcept {
   next_reconnect_ns_ = monotonic_now_ns() + reconnect_period_ns;
 }
 
-void Link::perform(const Order& order, Exchange& exchange) noexcept {
+void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept {
   exchange.number = order.number;
   exchange.handed_over_ns = order.handed_over_ns;
   exchange.begun_ns = monotonic_now_ns();
@@ -160,24 +163,24 @@ void Link::perform(const Order& order, Exchange& exchange) noexcept {
   // A set-point that has waited for longer than a tick is an old one: the next is here already.
   const bool too_old = exchange.begun_ns - order.handed_over_ns > settings_.period_ns;
   const ExchangePlan& plan = order.commands ? commanding_plan_ : reading_plan_;
-  const std::int64_t deadline_ns = exchange.begun_ns + settings_.response_timeout_ns;
+  const std::int64_t deadline_ns = exchange.begun_ns + patience_ns;
   bool failed = false;
   ++asked_;
   for (std::size_t n = 0; n < plan.questions.size() && !(too_old && order.commands); ++n) {
     Request question = plan.questions[n];
     if (question.spare > 0)
-      question.read_count = static_cast<std::uint16_t>(question.read_count +
-                                                       asked_ % (question.spare + 1U));
+      question.read_count =
+          static_cast<std::uint16_t>(question.read_count + asked_ % (question.spare + 1U));
     if (question.writes())
       exchange.command = encode(question.words, command_->format, order.command);
     const Answer answer = transport_.ask(question, deadline_ns, registers_);
     if (question.writes()) {
       exchange.command_ns = answer.time_ns;
       const bool taken = answer.outcome == Outcome::ok;
-      exchange.fate = taken                                      ? CommandFate::confirmed
-                      : answer.outcome == Outcome::exception     ? CommandFate::refused
+      exchange.fate = taken                                     ? CommandFate::confirmed
+                      : answer.outcome == Outcome::exception    ? CommandFate::refused
                       : answer.outcome == Outcome::disconnected ? CommandFate::not_sent
-                                                                 : CommandFate::unconfirmed;
+                                                                : CommandFate::unconfirmed;
     }
     if (answer.outcome != Outcome::ok) {
       failed = true;
@@ -226,13 +229,13 @@ Pace Link::try_out(std::optional<double> command, std::size_t exchanges) {
   const std::scoped_lock lock{mutex_};
   std::vector<std::int64_t> durations;
   std::size_t failed = 0;
-  for (std::size_t n = 0; n < exchanges && transport_.connected(); ++n) {
+  for (std::size_t n = 0; n < exchanges && failed < most_failures && transport_.connected(); ++n) {
     Exchange exchange;
     const Order order{.number = 0,
                       .handed_over_ns = monotonic_now_ns(),
                       .commands = command.has_value(),
                       .command = command.value_or(0.0)};
-    perform(order, exchange);
+    perform(order, trial_ns, exchange);
     constexpr std::uint8_t illegal_function = 1;
     const bool unknown = exchange.fate == CommandFate::refused &&
                          failure_.exception == illegal_function &&
@@ -244,12 +247,16 @@ Pace Link::try_out(std::optional<double> command, std::size_t exchanges) {
       failed = 0;
       continue;
     }
-    durations.push_back(exchange.ended_ns - exchange.begun_ns);
-    const auto faulty = [](const Sample& field) { return field.fault != Fault::none; };
+    const auto faulty = [](const Sample& field) {
+      return field.fault != Fault::none;
+    };
     const auto wanted = std::span{exchange.fields}.first(places_.size());
     const bool whole = std::ranges::none_of(wanted, faulty) &&
                        (!command || exchange.fate == CommandFate::confirmed);
-    if (!whole) ++failed;
+    if (whole)
+      durations.push_back(exchange.ended_ns - exchange.begun_ns);
+    else
+      ++failed;
   }
   durations_.clear();
   next_duration_ = 0;
@@ -258,10 +265,10 @@ Pace Link::try_out(std::optional<double> command, std::size_t exchanges) {
 }
 
 Pace Link::summary(std::vector<std::int64_t> durations, std::size_t failed) const {
-  if (durations.empty()) return {.exchanges = 0, .failed = failed};
+  if (durations.empty()) return {.exchanges = failed, .failed = failed};
   std::ranges::sort(durations);
   const std::size_t last = durations.size() - 1;
-  return {.exchanges = durations.size(),
+  return {.exchanges = durations.size() + failed,
           .failed = failed,
           .median_ns = durations[last / 2],
           .slow_ns = durations[last * 95 / 100],

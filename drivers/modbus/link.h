@@ -1,5 +1,5 @@
-// One connection in the loop: its own thread asks and waits, paced by the loop's ticks; the loop hands
-// a command over and takes the newest exchange, and never waits.
+// One connection in the loop: its own thread asks and waits, paced by the loop's ticks; the loop
+// hands a command over and takes the newest exchange, and never waits.
 //
 // tick() takes the exchange that has ended before it hands the next one over: what a tick sees does
 // not depend on how fast the thread is. Outside the loop the connection is used under idle().
@@ -73,8 +73,8 @@ class Link {
 
   // The loop's.
   void tick(std::optional<double> command) noexcept SINERIG_NONBLOCKING;
-  bool fresh() const noexcept { return fresh_; }        // an exchange has ended since the last tick
-  bool overrun() const noexcept { return overrun_; }    // the last order was never taken up
+  bool fresh() const noexcept { return fresh_; }      // an exchange has ended since the last tick
+  bool overrun() const noexcept { return overrun_; }  // the last order was never taken up
   std::int64_t tick_ns() const noexcept { return tick_ns_; }
   const Exchange& newest() const noexcept { return newest_; }
 
@@ -93,8 +93,7 @@ class Link {
 
   void serve() noexcept;
   void serve_one() noexcept;
-  void perform(const Order& order, Exchange& exchange) noexcept;
-  bool put(const Request& question, const Answer& answer, Exchange& exchange) noexcept;
+  void perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept;
   void make_plans();
   void find_spare_registers();
   void note_duration(const Exchange& exchange, bool failed) noexcept;

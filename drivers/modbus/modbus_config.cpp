@@ -17,15 +17,17 @@ constexpr Range a_register{.min = 0.0, .max = 65535.0};
 constexpr Range a_unit{.min = 0.0, .max = 255.0};
 
 // The rates that libmodbus sets; it takes any other for 9600 without a word.
-constexpr std::array bauds = {1200,   2400,   4800,   9600,   19200,   38400,   57600,  115200,
-                              230400, 460800, 500000, 576000, 921600, 1000000, 1152000, 1500000,
-                              2000000, 2500000};
+constexpr std::array bauds = {1200,   2400,    4800,    9600,    19200,   38400,
+                              57600,  115200,  230400,  460800,  500000,  576000,
+                              921600, 1000000, 1152000, 1500000, 2000000, 2500000};
 
 // Part of a period that an exchange may wait for its answers.
 constexpr double usual_timeout = 0.75;
 constexpr double longest_timeout = 0.9;
 
-std::int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
+std::int64_t nanoseconds(double seconds) {
+  return std::llround(seconds * 1e9);
+}
 
 RegisterType register_type(const Section& section) {
   const std::string type =
@@ -98,7 +100,8 @@ Step read_step(const Section& section, const Connection& connection) {
 Sequence read_sequence(const Section& section, std::string_view list,
                        const Connection& connection) {
   Sequence sequence;
-  for (const Section& entry : section.tables(list)) sequence.push_back(read_step(entry, connection));
+  for (const Section& entry : section.tables(list))
+    sequence.push_back(read_step(entry, connection));
   return sequence;
 }
 
@@ -118,10 +121,8 @@ void read_address(const Section& section, ConnectionSettings& settings) {
   }
   const std::string parity = section.choice("parity", {"even", "none", "odd"});
   settings.parity = parity == "none" ? 'N' : parity == "odd" ? 'O' : 'E';
-  settings.stop_bits =
-      static_cast<int>(section.integer("stop_bits", {.min = 1.0, .max = 2.0}, 1));
-  const std::string rs485 =
-      section.choice("rs485", {"adapter", "kernel", "rts_up", "rts_down"});
+  settings.stop_bits = static_cast<int>(section.integer("stop_bits", {.min = 1.0, .max = 2.0}, 1));
+  const std::string rs485 = section.choice("rs485", {"adapter", "kernel", "rts_up", "rts_down"});
   settings.rs485 = rs485 == "kernel"     ? Rs485::kernel
                    : rs485 == "rts_up"   ? Rs485::rts_up
                    : rs485 == "rts_down" ? Rs485::rts_down
@@ -143,9 +144,9 @@ Connection read_connection(const Section& section, double rate_hz) {
                                       : Writing::automatic;
   const double period_s = 1.0 / rate_hz;
   link.period_ns = nanoseconds(period_s);
-  const double timeout_s = section.number(
-      "response_timeout_s", {.min = 1e-5, .max = longest_timeout * period_s},
-      usual_timeout * period_s);
+  const double timeout_s =
+      section.number("response_timeout_s", {.min = 1e-5, .max = longest_timeout * period_s},
+                     usual_timeout * period_s);
   link.response_timeout_ns = nanoseconds(timeout_s);
   link.read_through =
       static_cast<std::size_t>(section.integer("read_through", {.min = 0.0, .max = 124.0}, 0));
@@ -170,8 +171,7 @@ CommandSettings read_command(const Section& section, const Connection& connectio
   settings.shutdown = read_sequence(section, "shutdown", connection);
   for (const Section& entry : section.tables("health")) {
     const std::optional<Comparison> comparison = read_comparison(entry);
-    if (!comparison)
-      entry.refuse("name", "needs exactly one of equals, not, at_most, at_least");
+    if (!comparison) entry.refuse("name", "needs exactly one of equals, not, at_most, at_least");
     settings.health.push_back({.name = entry.text("name"),
                                .place = read_source(entry, connection),
                                .comparison = *comparison});

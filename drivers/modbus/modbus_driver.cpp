@@ -99,9 +99,9 @@ class ModbusDevice final : public Device {
       if (known == name) return n;
       names += " \"" + known + "\"";
     }
-    section.refuse("connection", names.empty() ? "there is no section [modbus." + name + "]"
-                                               : "there is no such section [modbus.NAME]; there is" +
-                                                     names);
+    section.refuse("connection", names.empty()
+                                     ? "there is no section [modbus." + name + "]"
+                                     : "there is no such section [modbus.NAME]; there is" + names);
   }
 
   static std::string summary(const Link& link) {
@@ -109,19 +109,19 @@ class ModbusDevice final : public Device {
     const TransportCounters counters = link.counters();
     const ConnectionSettings& connection = link.settings().connection;
     char text[320];
-    std::snprintf(text, sizeof text,
-                  "modbus %s, %s: %zu exchanges, %.3f ms (median), %.3f ms (95 %%), %.3f ms at most; "
-                  "%llu time-outs, %llu late answers dropped, %llu spoiled, %llu exceptions, "
-                  "%llu reconnections",
-                  connection.name.c_str(), connection.address().c_str(), pace.exchanges,
-                  static_cast<double>(pace.median_ns) * 1e-6,
-                  static_cast<double>(pace.slow_ns) * 1e-6,
-                  static_cast<double>(pace.worst_ns) * 1e-6,
-                  static_cast<unsigned long long>(counters.timeouts),
-                  static_cast<unsigned long long>(counters.late_answers),
-                  static_cast<unsigned long long>(counters.spoiled),
-                  static_cast<unsigned long long>(counters.exceptions),
-                  static_cast<unsigned long long>(counters.connections - 1));
+    std::snprintf(
+        text, sizeof text,
+        "modbus %s, %s: %zu exchanges, %.3f ms (median), %.3f ms (95 %%), %.3f ms at most; "
+        "%llu time-outs, %llu late answers dropped, %llu spoiled, %llu exceptions, "
+        "%llu reconnections",
+        connection.name.c_str(), connection.address().c_str(), pace.exchanges,
+        static_cast<double>(pace.median_ns) * 1e-6, static_cast<double>(pace.slow_ns) * 1e-6,
+        static_cast<double>(pace.worst_ns) * 1e-6,
+        static_cast<unsigned long long>(counters.timeouts),
+        static_cast<unsigned long long>(counters.late_answers),
+        static_cast<unsigned long long>(counters.spoiled),
+        static_cast<unsigned long long>(counters.exceptions),
+        static_cast<unsigned long long>(counters.connections - 1));
     return text;
   }
 

@@ -48,9 +48,7 @@ double decode(std::span<const std::uint16_t> registers, const Format& format) no
     case RegisterType::uint16:
     case RegisterType::uint32: code = static_cast<double>(raw); break;
     case RegisterType::int32: code = static_cast<std::int32_t>(raw); break;
-    case RegisterType::float32:
-      code = std::bit_cast<float>(static_cast<std::uint32_t>(raw));
-      break;
+    case RegisterType::float32: code = std::bit_cast<float>(static_cast<std::uint32_t>(raw)); break;
     case RegisterType::float64: code = std::bit_cast<double>(raw); break;
   }
   return code * format.scale + format.offset;

@@ -1,6 +1,6 @@
-// Numbers in Modbus registers: 16-bit words, of which a longer number takes two or four, in an order
-// that the standard leaves open. Own conversions: the float setters of libmodbus before 3.1.11 write
-// another order than their names say.
+// Numbers in Modbus registers: 16-bit words, of which a longer number takes two or four, in an
+// order that the standard leaves open. Own conversions: the float setters of libmodbus
+// before 3.1.11 write another order than their names say.
 #pragma once
 
 #include <cstddef>

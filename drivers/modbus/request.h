@@ -33,8 +33,8 @@ struct Request {
   std::uint16_t write_count = 0;
   std::array<std::uint16_t, 4> words{};  // to be written; one number is the most that ever is
 
-  // Registers behind those wanted that the device lets read: answers of different lengths tell which
-  // question they belong to.
+  // Registers behind those wanted that the device lets read: answers of different lengths tell
+  // which question they belong to.
   std::uint16_t spare = 0;
 
   bool reads() const noexcept { return read_count > 0; }

@@ -22,8 +22,7 @@ struct Reading {
 Reading read_number(Transport& transport, const Place& place, std::int64_t deadline_ns) noexcept {
   Request question;
   question.unit = place.unit;
-  question.function =
-      place.table == Table::holding ? Function::read_holding : Function::read_input;
+  question.function = place.table == Table::holding ? Function::read_holding : Function::read_input;
   question.read_address = place.address;
   question.read_count = static_cast<std::uint16_t>(place.words());
   std::array<std::uint16_t, max_words> registers{};
@@ -43,8 +42,8 @@ Answer write_surely(Transport& transport, const Step& step) noexcept {
   const Writing writing = step.single ? Writing::single : Writing::multiple;
   for (int n = 0; n < 3; ++n) {
     if (n > 0) std::this_thread::sleep_for(before_retry);
-    answer = write_number(transport, step.place, *step.write, writing,
-                          monotonic_now_ns() + answer_ns);
+    answer =
+        write_number(transport, step.place, *step.write, writing, monotonic_now_ns() + answer_ns);
     if (done(answer) || !transport.connected()) break;
   }
   return answer;
@@ -63,12 +62,10 @@ std::string perform(Transport& transport, const Step& step) {
   if (step.expect) {
     const std::int64_t until_ns = monotonic_now_ns() + step.timeout_ns;
     for (;;) {
-      const Reading reading =
-          read_number(transport, step.place, monotonic_now_ns() + answer_ns);
+      const Reading reading = read_number(transport, step.place, monotonic_now_ns() + answer_ns);
       const bool believed = reading.answer.outcome == Outcome::ok;
       if (believed && step.expect->holds(reading.value)) break;
-      const bool hopeless =
-          reading.answer.outcome == Outcome::exception || !transport.connected();
+      const bool hopeless = reading.answer.outcome == Outcome::exception || !transport.connected();
       if (hopeless || monotonic_now_ns() >= until_ns) {
         if (!believed) return transport.describe(reading.answer);
         std::ostringstream text;
@@ -107,8 +104,7 @@ Answer write_number(Transport& transport, const Place& place, double value, Writ
                     std::int64_t deadline_ns) noexcept {
   Request request;
   request.unit = place.unit;
-  request.function =
-      writing == Writing::single ? Function::write_single : Function::write_multiple;
+  request.function = writing == Writing::single ? Function::write_single : Function::write_multiple;
   request.write_address = place.address;
   request.write_count = static_cast<std::uint16_t>(place.words());
   encode(request.words, place.format, value);
@@ -125,8 +121,7 @@ void run(Transport& transport, const Sequence& sequence, const std::string& list
 bool run_all(Transport& transport, const Sequence& sequence) noexcept {
   bool all = true;
   for (const Step& step : sequence) {
-    if (step.write)
-      all = write_surely(transport, step).outcome == Outcome::ok && all;
+    if (step.write) all = write_surely(transport, step).outcome == Outcome::ok && all;
     pause(step.delay_ns);
   }
   return all;

@@ -5,13 +5,13 @@
 #include <cstring>
 #include <poll.h>
 #include <stdexcept>
+#include <termios.h>
 #include <unistd.h>
 #include <utility>
 
 #include <modbus/modbus.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
-#include <termios.h>
 
 #include "drivers/monotonic_time.h"
 
@@ -53,7 +53,9 @@ Transport::Transport(ConnectionSettings settings) : settings_{std::move(settings
 
 Transport::~Transport() = default;
 
-int Transport::socket() const noexcept { return modbus_get_socket(context_.get()); }
+int Transport::socket() const noexcept {
+  return modbus_get_socket(context_.get());
+}
 
 void Transport::disconnect() noexcept {
   context_.reset();
@@ -66,8 +68,8 @@ bool Transport::try_connect() noexcept {
     context_.reset(modbus_new_rtu(settings_.device.c_str(), settings_.baud, settings_.parity, 8,
                                   settings_.stop_bits));
   } else {
-    context_.reset(modbus_new_tcp_pi(settings_.host.c_str(),
-                                     std::to_string(settings_.port).c_str()));
+    context_.reset(
+        modbus_new_tcp_pi(settings_.host.c_str(), std::to_string(settings_.port).c_str()));
   }
   if (!context_) return false;
   modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
@@ -82,11 +84,10 @@ bool Transport::try_connect() noexcept {
   }
   if (settings_.serial && settings_.rs485 != Rs485::adapter) {
     const bool by_kernel = settings_.rs485 == Rs485::kernel;
-    const int done = by_kernel
-                         ? modbus_rtu_set_serial_mode(context_.get(), MODBUS_RTU_RS485)
-                         : modbus_rtu_set_rts(context_.get(), settings_.rs485 == Rs485::rts_up
-                                                                  ? MODBUS_RTU_RTS_UP
-                                                                  : MODBUS_RTU_RTS_DOWN);
+    const int done = by_kernel ? modbus_rtu_set_serial_mode(context_.get(), MODBUS_RTU_RS485)
+                               : modbus_rtu_set_rts(context_.get(), settings_.rs485 == Rs485::rts_up
+                                                                        ? MODBUS_RTU_RTS_UP
+                                                                        : MODBUS_RTU_RTS_DOWN);
     if (done != 0) {
       const int error = errno;
       context_.reset();
@@ -139,7 +140,9 @@ void Transport::take_in_late_answers() noexcept {
   clear_input();
   ++counters_.late_answers;
   const std::int64_t now_ns = monotonic_now_ns();
-  const auto due = [&](const Late& late) { return late.until_ns > now_ns; };
+  const auto due = [&](const Late& late) {
+    return late.until_ns > now_ns;
+  };
   if (std::ranges::count_if(late_, due) == 1) late_.fill({});
 }
 
@@ -216,14 +219,12 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
   answer.received_ns = monotonic_now_ns();
 
   const std::int64_t earliest_ns = answer.sent_ns + wire_ns(bytes.size + crc_bytes);
-  const std::int64_t latest_ns =
-      answer.received_ns - wire_ns(1 + reply_size(request) + crc_bytes);
+  const std::int64_t latest_ns = answer.received_ns - wire_ns(1 + reply_size(request) + crc_bytes);
   const bool on_a_wire = earliest_ns <= latest_ns;
   answer.time_ns = on_a_wire ? earliest_ns + (latest_ns - earliest_ns) / 2
                              : answer.sent_ns + (answer.received_ns - answer.sent_ns) / 2;
 
-  const bool answered =
-      answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
+  const bool answered = answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
   if (settings_.serial && !answered)
     expect_late(request,
                 answer.received_ns + latest_answer * std::max<std::int64_t>(0, patience_ns));
@@ -251,15 +252,15 @@ void Transport::receive(const Request& request, std::int64_t deadline_ns,
     if (length < 0) {
       answer.error = errno;
       if (errno == ETIMEDOUT) return;
-      const bool nonsense = errno == EMBBADCRC || errno == EMBBADDATA || errno == EMBBADEXC || errno == EMBMDATA;
+      const bool nonsense =
+          errno == EMBBADCRC || errno == EMBBADDATA || errno == EMBBADEXC || errno == EMBMDATA;
       answer.outcome = nonsense ? Outcome::spoiled : Outcome::disconnected;
       return;
     }
     const auto size = static_cast<std::size_t>(length);
     if (size <= header + trailer) continue;  // another device's
-    const bool ours = settings_.serial
-                          ? frame[0] == request.unit
-                          : (frame[0] << 8U | frame[1]) == transaction_;
+    const bool ours =
+        settings_.serial ? frame[0] == request.unit : (frame[0] << 8U | frame[1]) == transaction_;
     const std::span<const std::uint8_t> pdu{frame.data() + header, size - header - trailer};
     const Reply reply = ours ? read_reply(pdu, request, registers) : Reply{};
     if (reply.kind == ReplyKind::other) {
@@ -317,7 +318,8 @@ std::string Transport::describe(const Answer& answer) const {
     case Outcome::ok: return where + "answered";
     case Outcome::timeout: return where + "no answer in time";
     case Outcome::exception: return where + exception_text(answer.exception);
-    case Outcome::spoiled: return where + "a spoiled answer (" + modbus_strerror(answer.error) + ")";
+    case Outcome::spoiled:
+      return where + "a spoiled answer (" + modbus_strerror(answer.error) + ")";
     case Outcome::disconnected:
       return where + "connection lost (" + modbus_strerror(answer.error) + ")";
   }

@@ -2,8 +2,8 @@
 // Answers that come after theirs are recognised and dropped: taken for the next answer they would
 // make every later sample one period old, which looks like a clean phase lag. TCP frames have a
 // number. Serial frames have none: there answers are told apart by their length, where the device
-// lets more be read than is wanted; elsewhere nothing is read, after a time-out, until the late answer
-// has come or can no longer come. Set-points go out meanwhile.
+// lets more be read than is wanted; elsewhere nothing is read, after a time-out, until the late
+// answer has come or can no longer come. Set-points go out meanwhile.
 //
 // Not thread-safe. Nothing in it is for the loop.
 #pragma once
@@ -49,7 +49,7 @@ struct Answer {
   Outcome outcome = Outcome::disconnected;
   std::uint8_t exception = 0;
   bool write_only = false;  // nothing was read: a late answer may still be under way
-  int error = 0;          // errno of libmodbus
+  int error = 0;            // errno of libmodbus
   std::int64_t sent_ns = 0;
   std::int64_t received_ns = 0;
   std::int64_t time_ns = 0;  // middle of when the device can have acted

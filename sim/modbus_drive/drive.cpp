@@ -168,7 +168,9 @@ Bytes Drive::answer(std::span<const std::uint8_t> pdu, std::int64_t time_ns) {
   watch(time_ns);
   last_request_ns_ = time_ns;
   const std::uint8_t function = pdu[0];
-  const auto echo = [&] { return Bytes(pdu.begin(), pdu.begin() + 5); };
+  const auto echo = [&] {
+    return Bytes(pdu.begin(), pdu.begin() + 5);
+  };
   switch (function) {
     case 3:
     case 4:

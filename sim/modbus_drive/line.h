@@ -4,10 +4,9 @@
 
 #include <cstdint>
 #include <memory>
+#include <poll.h>
 #include <string>
 #include <vector>
-
-#include <poll.h>
 
 #include "sim/modbus_drive/drive.h"
 #include "sim/modbus_drive/settings.h"

@@ -12,7 +12,9 @@ namespace {
 
 std::atomic<bool> stop_requested{false};
 
-void request_stop(int /*signal*/) { stop_requested.store(true); }
+void request_stop(int /*signal*/) {
+  stop_requested.store(true);
+}
 
 }  // namespace
 

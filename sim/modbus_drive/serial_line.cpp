@@ -1,10 +1,10 @@
 #include <cerrno>
 #include <cstdlib>
 #include <fcntl.h>
-#include <system_error>
+#include <termios.h>
 #include <unistd.h>
 
-#include <termios.h>
+#include <system_error>
 
 #include "sim/modbus_drive/line.h"
 

@@ -13,7 +13,9 @@ namespace {
 constexpr std::int64_t ns_per_s = 1'000'000'000;
 constexpr std::int64_t never = std::numeric_limits<std::int64_t>::max();
 
-std::int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
+std::int64_t nanoseconds(double seconds) {
+  return std::llround(seconds * 1e9);
+}
 
 }  // namespace
 
@@ -33,8 +35,7 @@ bool DriveServer::past(double at_s, std::int64_t now_ns) const {
 }
 
 void DriveServer::run(const std::atomic<bool>& stop, double seconds, double patience_s) {
-  const std::int64_t end_ns =
-      seconds < 1e8 ? start_ns_ + nanoseconds(seconds) : never;
+  const std::int64_t end_ns = seconds < 1e8 ? start_ns_ + nanoseconds(seconds) : never;
   while (!stop.load()) {
     // Requests first: what came before now must reach the motor before now is sampled.
     for (const Frame& request : line_->receive()) serve(request, monotonic_now_ns());

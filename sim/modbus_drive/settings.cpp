@@ -49,10 +49,8 @@ DriveSettings read_drive(config::RigFile& file) {
       static_cast<std::uint8_t>(drive.integer("unit_id", {.min = 1.0, .max = 247.0}, 1));
   settings.type =
       drive.choice("type", {"float32", "float64", "int16", "uint16", "int32", "uint32"});
-  settings.low_word_first =
-      drive.choice("word_order", {"high_first", "low_first"}) == "low_first";
-  settings.low_byte_first =
-      drive.choice("byte_order", {"high_first", "low_first"}) == "low_first";
+  settings.low_word_first = drive.choice("word_order", {"high_first", "low_first"}) == "low_first";
+  settings.low_byte_first = drive.choice("byte_order", {"high_first", "low_first"}) == "low_first";
   settings.torque_scale = drive.number("torque_scale", above_zero, 1.0);
   settings.position_scale = drive.number("position_scale", above_zero, 1.0);
   settings.velocity_scale = drive.number("velocity_scale", above_zero, 1.0);

@@ -1,13 +1,13 @@
 #include <algorithm>
+#include <arpa/inet.h>
 #include <cerrno>
 #include <map>
-#include <system_error>
-#include <unistd.h>
-
-#include <arpa/inet.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <unistd.h>
+
 #include <sys/socket.h>
+#include <system_error>
 
 #include "sim/modbus_drive/line.h"
 
@@ -23,8 +23,7 @@ void require(bool condition, const char* what) {
 
 class TcpLine final : public Line {
  public:
-  explicit TcpLine(const DriveSettings& settings)
-      : host_{settings.host}, port_{settings.port} {
+  explicit TcpLine(const DriveSettings& settings) : host_{settings.host}, port_{settings.port} {
     listen_again();
   }
   ~TcpLine() override {

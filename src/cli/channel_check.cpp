@@ -7,7 +7,9 @@ namespace sinerig::cli {
 
 namespace {
 
-double seconds_of(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+double seconds_of(std::int64_t ns) {
+  return 1e-9 * static_cast<double>(ns);
+}
 
 // `part` of the values are at or below the result.
 std::int64_t quantile(std::vector<std::int64_t>& values, double part) {
@@ -44,8 +46,7 @@ void evaluate(Series& series, ChannelCheck& check) {
     counted += 1.0;
   }
   check.jitter_s = std::sqrt(squares / std::max(1.0, counted));
-  check.rate_hz =
-      static_cast<double>(times.size() - 1) / seconds_of(times.back() - times.front());
+  check.rate_hz = static_cast<double>(times.size() - 1) / seconds_of(times.back() - times.front());
 }
 
 std::vector<Guard> guards_of(const GuardSettings& settings, double period_s) {

@@ -16,7 +16,7 @@
 namespace sinerig::cli {
 
 struct ChannelCheck {
-  std::uint64_t samples = 0;  // new and good
+  std::uint64_t samples = 0;              // new and good
   std::array<std::uint64_t, 6> faults{};  // by Fault
   std::uint64_t lost = 0;  // samples that the usual distance between two says are missing
   double rate_hz = 0.0;

@@ -169,7 +169,8 @@ std::string describe_cause(const Trip& trip, const std::vector<std::string>& cha
       break;
     case TripCause::actuator_fault:
       what = trip.limit == 0.0 ? "the actuator reports a fault"
-                               : with("%.0f faulty writes to the actuator in a row (limit %.0f)", trip.value, trip.limit);
+                               : with("%.0f faulty writes to the actuator in a row (limit %.0f)",
+                                      trip.value, trip.limit);
       break;
     case TripCause::excitation_missing:
       what = name + with(

@@ -1,5 +1,5 @@
-// Modbus TCP over this machine's loopback in real time: how late the loop is and how old what it sees
-// is, at 500 Hz unless told.
+// Modbus TCP over this machine's loopback in real time: how late the loop is and how old what it
+// sees is, at 500 Hz unless told.
 //
 //   bench_modbus [RATE_HZ [SECONDS]]
 #include <algorithm>
@@ -49,7 +49,9 @@ int main(int count, char** arguments) {
   drive.system = sim::from_mechanical_axis(axis);
   sim::DriveServer server{drive};
   std::atomic<bool> stop{false};
-  std::thread device{[&] { server.run(stop, 1e9, 0.01); }};
+  std::thread device{[&] {
+    server.run(stop, 1e9, 0.01);
+  }};
 
   modbus::LinkSettings settings;
   settings.connection.name = "drive";
@@ -100,7 +102,8 @@ int main(int count, char** arguments) {
     print_quantiles("driver's calls per tick", tick_ns);
     print_quantiles("age of a sample in the loop", age_ns);
     std::printf("an exchange takes %.1f µs (median), %.1f µs (95 %%), %.1f µs at most\n",
-                1e-3 * static_cast<double>(pace.median_ns), 1e-3 * static_cast<double>(pace.slow_ns),
+                1e-3 * static_cast<double>(pace.median_ns),
+                1e-3 * static_cast<double>(pace.slow_ns),
                 1e-3 * static_cast<double>(pace.worst_ns));
     std::printf("%llu ticks skipped, %llu without a new sample\n",
                 static_cast<unsigned long long>(skipped), static_cast<unsigned long long>(missing));

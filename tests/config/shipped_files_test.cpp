@@ -81,8 +81,8 @@ TEST_P(ShippedFile, AcceptsEveryCommentedKeyAtTheDefaultThatItShows) {
     // These stand in place of other keys; chebyshev.toml shows a second kind of plant, the CAN
     // rig a channel without a profile.
     const std::string key = commented ? match[1].str() : "";
-    const bool alternative = key == "amplitude_table" || key == "frequencies_hz" ||
-                             key == "not" || key == "at_most" || key == "at_least" ||
+    const bool alternative = key == "amplitude_table" || key == "frequencies_hz" || key == "not" ||
+                             key == "at_most" || key == "at_least" ||
                              GetParam().ends_with("byshev.toml") ||
                              text.find("driver = \"can\"") != std::string::npos;
     if (commented && !alternative) {
@@ -166,12 +166,17 @@ TEST(EveryKeyThatIsRead, IsExplainedInTheShippedFiles) {
     key = std::regex_replace(key, std::regex{R"(^actuator\.(startup|disarm|shutdown)\.)"},
                              "actuator.arm.");
     const std::string number = std::regex_replace(
-        key, std::regex{R"(^actuator\.(arm|health)\.(type|word_order|byte_order|scale|offset|unit_id)$)"},
+        key,
+        std::regex{
+            R"(^actuator\.(arm|health)\.(type|word_order|byte_order|scale|offset|unit_id)$)"},
         "actuator.$2");
-    const std::string table =
-        std::regex_replace(number, std::regex{R"(^actuator\.(arm|health)\.table$)"}, "sensor.NAME.table");
-    const std::string place = std::regex_replace(table, std::regex{R"(^sensor\.NAME\.(word_order|byte_order|scale|offset|unit_id)$)"}, "actuator.$1");
-    EXPECT_TRUE(documented.contains(key) || documented.contains(place)) << key << " is explained in no file of config/";
+    const std::string table = std::regex_replace(
+        number, std::regex{R"(^actuator\.(arm|health)\.table$)"}, "sensor.NAME.table");
+    const std::string place = std::regex_replace(
+        table, std::regex{R"(^sensor\.NAME\.(word_order|byte_order|scale|offset|unit_id)$)"},
+        "actuator.$1");
+    EXPECT_TRUE(documented.contains(key) || documented.contains(place))
+        << key << " is explained in no file of config/";
   }
 }
 

@@ -1,5 +1,5 @@
-// Any answer can arrive: reading it stays inside its bytes and takes nothing but what was asked for,
-// and an encoded number reads back as what encode() said was applied.
+// Any answer can arrive: reading it stays inside its bytes and takes nothing but what was asked
+// for, and an encoded number reads back as what encode() said was applied.
 #include <array>
 #include <bit>
 #include <cmath>
@@ -41,7 +41,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto scale = static_cast<double>(take<float>(bytes));
   format.scale = std::isfinite(scale) && scale != 0.0 ? scale : 1.0;
   const auto value = take<double>(bytes);
-  std::array<std::uint16_t, max_words> registers = take<std::array<std::uint16_t, max_words>>(bytes);
+  std::array<std::uint16_t, max_words> registers =
+      take<std::array<std::uint16_t, max_words>>(bytes);
   decode(registers, format);
   if (!std::isnan(value)) {
     const double applied = encode(registers, format, value);

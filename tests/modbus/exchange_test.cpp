@@ -77,17 +77,28 @@ TEST(ModbusExchange, RefusesMoreNumbersThanItHasRoomFor) {
 
 // The examples of the specification V1.1b3, sections 6.3, 6.6, 6.12 and 6.17.
 TEST(ModbusRequest, IsTheBytesOfTheSpecification) {
-  EXPECT_THAT(bytes({.unit = 17, .function = Function::read_holding, .read_address = 0x6B,
-                     .read_count = 3}),
-              ElementsAre(17, 3, 0, 0x6B, 0, 3));
-  EXPECT_THAT(bytes({.unit = 17, .function = Function::write_single, .write_address = 1,
-                     .write_count = 1, .words = {3}}),
+  EXPECT_THAT(
+      bytes(
+          {.unit = 17, .function = Function::read_holding, .read_address = 0x6B, .read_count = 3}),
+      ElementsAre(17, 3, 0, 0x6B, 0, 3));
+  EXPECT_THAT(bytes({.unit = 17,
+                     .function = Function::write_single,
+                     .write_address = 1,
+                     .write_count = 1,
+                     .words = {3}}),
               ElementsAre(17, 6, 0, 1, 0, 3));
-  EXPECT_THAT(bytes({.unit = 17, .function = Function::write_multiple, .write_address = 1,
-                     .write_count = 2, .words = {0x0A, 0x0102}}),
+  EXPECT_THAT(bytes({.unit = 17,
+                     .function = Function::write_multiple,
+                     .write_address = 1,
+                     .write_count = 2,
+                     .words = {0x0A, 0x0102}}),
               ElementsAre(17, 16, 0, 1, 0, 2, 4, 0, 0x0A, 1, 2));
-  EXPECT_THAT(bytes({.unit = 17, .function = Function::write_and_read, .read_address = 3,
-                     .read_count = 6, .write_address = 0x0E, .write_count = 3,
+  EXPECT_THAT(bytes({.unit = 17,
+                     .function = Function::write_and_read,
+                     .read_address = 3,
+                     .read_count = 6,
+                     .write_address = 0x0E,
+                     .write_count = 3,
                      .words = {0xFF, 0xFF, 0xFF}}),
               ElementsAre(17, 23, 0, 3, 0, 6, 0, 0x0E, 0, 3, 6, 0, 0xFF, 0, 0xFF, 0, 0xFF));
 }

@@ -5,9 +5,9 @@
 #include <filesystem>
 #include <memory>
 #include <thread>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "drivers/modbus/channels.h"
 #include "drivers/monotonic_time.h"
@@ -45,7 +45,9 @@ sim::DriveSettings drive_settings(bool serial) {
 class RunningDrive {
  public:
   explicit RunningDrive(sim::DriveSettings settings)
-      : server_{std::move(settings)}, thread_{[this] { server_.run(stop_, 1e9, 0.01); }} {}
+      : server_{std::move(settings)}, thread_{[this] {
+          server_.run(stop_, 1e9, 0.01);
+        }} {}
   ~RunningDrive() {
     stop_.store(true);
     thread_.join();
@@ -62,7 +64,9 @@ class RunningDrive {
 };
 
 Place number_at(std::uint16_t address) {
-  return {.unit = 1, .table = Table::holding, .address = address,
+  return {.unit = 1,
+          .table = Table::holding,
+          .address = address,
           .format = {.type = RegisterType::float64}};
 }
 
@@ -107,7 +111,8 @@ struct Rig {
     settings.place = number_at(16);
     settings.arm = {write("enable", 1.0), expect_on()};
     settings.disarm = {write("disable", 0.0)};
-    settings.health = {{.name = "state", .place = word_at(32),
+    settings.health = {{.name = "state",
+                        .place = word_at(32),
                         .comparison = {.sign = Comparison::Operator::equal, .value = 1.0}}};
     return settings;
   }
@@ -257,16 +262,16 @@ TEST(ModbusPace, RefusesADeviceThatIsSlowerThanTheLoop) {
   EXPECT_THAT(obstacle(faster, slow),
               HasSubstr("an exchange takes 3.1 ms, one in twenty more than 3.6 ms; the loop at 500 "
                         "Hz needs one every 2 ms: set [loop] rate_hz to 250 at most"));
-  EXPECT_THAT([&] { require_pace(faster, slow); }, ThrowsMessage<std::runtime_error>(HasSubstr("rate_hz")));
+  EXPECT_THAT([&] { require_pace(faster, slow); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("rate_hz")));
 }
 
 TEST(ModbusOpening, SaysWhichChannelAsksForARegisterThatIsNotThere) {
   Rig rig{drive_settings(false)};
   rig.link.watch(number_at(1000), "[sensor.angle]");
-  EXPECT_THAT([&] { rig.link.open(); },
-              ThrowsMessage<std::runtime_error>(
-                  testing::AllOf(HasSubstr("[sensor.angle], register 1000 of unit 1"),
-                                 HasSubstr("exception 2, illegal data address"))));
+  EXPECT_THAT([&] { rig.link.open(); }, ThrowsMessage<std::runtime_error>(testing::AllOf(
+                                            HasSubstr("[sensor.angle], register 1000 of unit 1"),
+                                            HasSubstr("exception 2, illegal data address"))));
 }
 
 TEST(ModbusOpening, SaysThatNobodyListens) {

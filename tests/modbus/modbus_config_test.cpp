@@ -23,11 +23,11 @@ constexpr const char* sensor =
 // What is said about a rig with these sections; empty when it is accepted.
 std::string refusal(const std::string& sections) {
   try {
-    const config::Rig rig = config::read_rig(RigFile::parse(
-        "[loop]\nrate_hz = 100\n[sweep]\nstart_hz = 1\nstop_hz = 10\npoints = 3\n"
-        "amplitude = 0.1\n[limits]\n" +
-            sections,
-        "rig.toml"));
+    const config::Rig rig = config::read_rig(
+        RigFile::parse("[loop]\nrate_hz = 100\n[sweep]\nstart_hz = 1\nstop_hz = 10\npoints = 3\n"
+                       "amplitude = 0.1\n[limits]\n" +
+                           sections,
+                       "rig.toml"));
     modbus_driver().configure({rig, &rig.actuator, {&rig.sensors.front()}});
     rig.file->refuse_unread();
   } catch (const ConfigError& error) {

@@ -1,5 +1,5 @@
-// modbus_tool PORT : does what each line of its input says with the Modbus server on this machine, for
-// comparison with other programs. Answers with a line of its own.
+// modbus_tool PORT : does what each line of its input says with the Modbus server on this machine,
+// for comparison with other programs. Answers with a line of its own.
 //   write FUNCTION ADDRESS TYPE WORDS BYTES VALUE      (functions 6, 16, 23)  -> value applied
 //   read FUNCTION ADDRESS TYPE WORDS BYTES             (functions 3, 4, 23)   -> value
 // TYPE int16 … float64; WORDS and BYTES "high_first" or "low_first".
@@ -10,8 +10,8 @@
 #include <sstream>
 #include <string>
 
-#include "drivers/modbus/transport.h"
 #include "drivers/modbus/registers.h"
+#include "drivers/modbus/transport.h"
 #include "drivers/monotonic_time.h"
 
 namespace {
@@ -21,8 +21,8 @@ using namespace sinerig::modbus;
 constexpr std::int64_t patience_ns = 5'000'000'000;
 
 const std::map<std::string, RegisterType> types{
-    {"int16", RegisterType::int16},   {"uint16", RegisterType::uint16},
-    {"int32", RegisterType::int32},   {"uint32", RegisterType::uint32},
+    {"int16", RegisterType::int16},     {"uint16", RegisterType::uint16},
+    {"int32", RegisterType::int32},     {"uint32", RegisterType::uint32},
     {"float32", RegisterType::float32}, {"float64", RegisterType::float64}};
 
 Order order(const std::string& name) {

@@ -288,8 +288,7 @@ TEST(LaggingBus, ALostConfirmationIsAMissingSampleAndNoLostCommand) {
 TEST(LaggingBus, ACommandLateByMoreThanHalfAPeriodVoidsWhatWasGathered) {
   const SweepPlan plan = plan_of({10.0});
   const std::uint64_t second_block = plan.dwells[0].settle_samples + 150;
-  const auto run =
-      run_lagging(plan, {}, [=](std::uint64_t tick) { return tick == second_block; });
+  const auto run = run_lagging(plan, {}, [=](std::uint64_t tick) { return tick == second_block; });
   EXPECT_GT(run.sink.timings.at(0).resettles, 0U);
   EXPECT_EQ(run.sink.points.at(0).status, PointStatus::good);
   EXPECT_LT(worst_error(run), 1e-9);

@@ -199,7 +199,8 @@ TEST(Guard, TakesASingleFaultyWriteForNoDeadActuator) {
 TEST(Guard, TakesAnUnknownWriteForNeitherGoodNorFaulty) {
   Guard guard{{.max_write_faults = 2, .channels = {}}, 1e-3};
   guard.observe_write({.fault = Fault::bus}, 0);
-  for (std::uint64_t tick = 1; tick < 100; ++tick) guard.observe_write({.fault = Fault::stale}, tick);
+  for (std::uint64_t tick = 1; tick < 100; ++tick)
+    guard.observe_write({.fault = Fault::stale}, tick);
   EXPECT_FALSE(guard.trip().tripped());
   guard.observe_write({.fault = Fault::bus}, 100);
   EXPECT_EQ(guard.trip().cause, TripCause::actuator_fault);
