@@ -13,6 +13,12 @@
 
 namespace sinerig {
 
+// What people should know of a transport after it has been used for a while.
+struct Remark {
+  std::string text;
+  bool stops_a_sweep = false;
+};
+
 // The channels of one rig that one driver serves. Configured without touching anything, so that a
 // rig file can be checked and planned anywhere.
 class Device {
@@ -34,6 +40,8 @@ class Device {
   // Whether a sensor is one whose response is wanted unless [sweep] responses says otherwise; an
   // interlock is not.
   virtual bool measures(std::size_t /*sensor*/) const { return true; }
+  // Exchanges, losses, obstacles so far; not for the loop.
+  virtual std::vector<Remark> remarks() const { return {}; }
 
   // Valid after open(). Null where the device has no actuator.
   virtual Actuator* actuator() noexcept = 0;

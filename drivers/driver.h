@@ -18,6 +18,7 @@ enum class Fault : std::uint8_t {
   bus,        // the transport failed (bus-off, full queue, checksum, exception reply)
   range,      // the device says that the value left what it can represent
   interlock,  // a safety circuit is open: the guard stops at once
+  device,     // the device says that it has failed or no longer obeys; after a write: stop
 };
 
 inline constexpr const char* to_string(Fault fault) noexcept {
@@ -28,6 +29,7 @@ inline constexpr const char* to_string(Fault fault) noexcept {
     case Fault::bus: return "bus";
     case Fault::range: return "range";
     case Fault::interlock: return "interlock";
+    case Fault::device: return "device";
   }
   return "unknown";
 }
@@ -44,6 +46,9 @@ class Actuator {
 
   // Puts `command` (engineering unit) out and returns what was really applied, after clamping,
   // quantising or sigma-delta, and when. With a fault, `value` is what the device holds instead.
+  // Fault::stale: what was applied is not known this time (a lost confirmation); the sample is
+  // missing and the command counts as gone out. A device that answers late returns what it applied
+  // last, with its time. Every other fault is a command that was lost or late.
   virtual Sample write(double command) noexcept SINERIG_NONBLOCKING = 0;
 
   // Neutral output. Idempotent, callable from any exit path.

@@ -6,18 +6,12 @@ build_packages=(
   cmake ninja-build g++ pkg-config
   libeigen3-dev libspdlog-dev libgtest-dev libgmock-dev libbenchmark-dev
   libtomlplusplus-dev libcli11-dev libsqlite3-dev nlohmann-json3-dev
-  libmatio-dev librsvg2-dev libgpiod-dev
+  libmatio-dev librsvg2-dev libmodbus-dev libgpiod-dev
 )
 
 # What only tests need; without them the tests concerned are skipped and say so.
 test_packages=(
-  fonts-dejavu-core python3-scipy python3-jsonschema
-)
-
-# Heavy ones, for the same: the pages in a browser, the exports in Octave, completion in other shells.
-# CI installs them; `tools/test --full` does here.
-optional_test_packages=(
-  chromium octave zsh fish groff
+  libmatio-dev librsvg2-dev libmodbus-dev libgpiod-dev
 )
 
 # usage TOOL : the comment at its head.

@@ -59,7 +59,8 @@ Sample CanActuator::write(double command) noexcept {
   Sample answer = held_;
   answer.fault = Fault::none;
   if (!std::isfinite(command)) answer.fault = Fault::range;
-  if (last_result_ != SendResult::sent || violated_ != nullptr) answer.fault = Fault::bus;
+  if (last_result_ != SendResult::sent) answer.fault = Fault::bus;
+  if (violated_ != nullptr) answer.fault = Fault::device;
   return answer;
 }
 

@@ -42,7 +42,8 @@ class CanActuator final : public Actuator {
   void arm();
 
   // Sends the set-point once, never again. Fault::bus: it was dropped (queue full, bus-off, link
-  // down) or the device's health is not what it must be; the value is then what it last took.
+  // down); the value is then what the device last took. Fault::device: its health is not what it
+  // must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
   // Neutral command, then the disarm list. What cannot be sent is tried for 20 ms per frame.

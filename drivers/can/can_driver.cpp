@@ -1,6 +1,7 @@
 #include "drivers/can/can_driver.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <optional>
 #include <utility>
@@ -78,6 +79,27 @@ class CanDevice final : public Device {
   Sensor& sensor(std::size_t index) noexcept override { return *sensors_[index]; }
 
   std::string fault_reason() const override { return actuator_ ? actuator_->reason() : ""; }
+
+  std::vector<Remark> remarks() const override {
+    std::vector<Remark> remarks;
+    for (const auto& bus : buses_) {
+      const BusCounters& seen = bus->counters();
+      char text[256];
+      std::snprintf(text, sizeof text,
+                    "can %s: %llu frames taken in, %llu overflowed, %llu with a wrong check sum, "
+                    "%llu error frames, %llu times bus-off",
+                    bus->interface().c_str(), static_cast<unsigned long long>(seen.received),
+                    static_cast<unsigned long long>(seen.overflows),
+                    static_cast<unsigned long long>(seen.bad_checksums),
+                    static_cast<unsigned long long>(seen.error_frames),
+                    static_cast<unsigned long long>(seen.bus_offs));
+      remarks.push_back({.text = text});
+      if (bus->state() != BusState::up)
+        remarks.push_back(
+            {.text = bus->interface() + ": " + to_string(bus->state()), .stops_a_sweep = true});
+    }
+    return remarks;
+  }
 
  private:
   struct Interface {

@@ -143,12 +143,4 @@ double encode(std::span<std::uint8_t> payload, const Signal& signal, double valu
   return number_of(signal, raw) * signal.scale + signal.offset;
 }
 
-double Unwrapper::apply(double wrapped) noexcept {
-  if (modulus_ <= 0.0 || !std::isfinite(wrapped)) return wrapped;
-  if (started_) turns_ -= std::nearbyint((wrapped - last_wrapped_) / modulus_);
-  started_ = true;
-  last_wrapped_ = wrapped;
-  return wrapped + turns_ * modulus_;
-}
-
 }  // namespace sinerig::can

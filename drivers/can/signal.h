@@ -11,6 +11,8 @@
 #include <span>
 #include <string>
 
+#include "drivers/unwrapper.h"
+
 namespace sinerig::can {
 
 enum class ByteOrder : std::uint8_t { intel, motorola };
@@ -50,19 +52,5 @@ double decode(std::span<const std::uint8_t> payload, const Signal& signal) noexc
 // Clamps `value`, rounds it to the nearest code, and writes the bits. Returns the value that those
 // bits mean, which is what the device will apply. Not a number is encoded as the code nearest to 0.
 double encode(std::span<std::uint8_t> payload, const Signal& signal, double value) noexcept;
-
-// Makes a wrapping angle continuous: each step is taken as the shorter way round.
-class Unwrapper {
- public:
-  explicit Unwrapper(double modulus) noexcept : modulus_(modulus) {}
-
-  double apply(double wrapped) noexcept;
-
- private:
-  double modulus_;
-  double last_wrapped_ = 0.0;
-  double turns_ = 0.0;
-  bool started_ = false;
-};
 
 }  // namespace sinerig::can

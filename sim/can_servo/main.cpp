@@ -50,7 +50,7 @@ class Device {
       : settings_{settings},
         socket_{settings.interface, false},
         start_ns_{can::monotonic_ns()},
-        motor_{settings, start_ns_},
+        motor_{settings.system, start_ns_},
         wire_{socket_, settings.faults, start_ns_},
         protocol_{settings.protocol == "mit"
                       ? sim::make_mit(settings, motor_, wire_, start_ns_)

@@ -1,5 +1,4 @@
-// The mechanics and the frame layer under every simulated CAN servo: a plant that runs at the true
-// time of each frame, and a bus that loses and delays on request.
+// The frame layer under every simulated CAN servo: a bus that loses and delays on request.
 #pragma once
 
 #include <cstdint>
@@ -10,7 +9,7 @@
 #include "config/section.h"
 #include "drivers/can/frame.h"
 #include "drivers/can/socket.h"
-#include "sim/plant.h"
+#include "sim/motor.h"
 
 namespace sinerig::sim {
 
@@ -41,30 +40,6 @@ struct ServoSettings {
 
 // Reads [servo], [faults] and [plant]. Throws config::ConfigError.
 ServoSettings read_servo(config::RigFile& file);
-
-// The motor: torque in at a time, angle and rate out at a time. Times are CLOCK_MONOTONIC.
-class Motor {
- public:
-  Motor(const ServoSettings& settings, std::int64_t start_ns);
-
-  void apply(double torque, std::int64_t time_ns);
-  void sample(std::int64_t time_ns);
-
-  double position() const { return outputs_[position_]; }  // rad, at the last sample
-  double velocity() const { return outputs_[velocity_]; }
-  double torque() const { return torque_; }
-
- private:
-  PlantTime plant_time(std::int64_t time_ns);
-
-  std::int64_t start_ns_;
-  std::int64_t last_ns_;
-  Plant plant_;
-  std::size_t position_ = 0;
-  std::size_t velocity_ = 0;
-  std::vector<double> outputs_;
-  double torque_ = 0.0;
-};
 
 // What a protocol needs of the bus.
 class Wire {

@@ -41,6 +41,11 @@ struct PlanOptions {
   bool json = false;
 };
 
+struct CheckOptions {
+  std::string rig;
+  double seconds = 3.0;
+};
+
 struct ShowOptions {
   std::string file;
   bool json = false;
@@ -78,6 +83,7 @@ struct CompareOptions {
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
 int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drivers);
 int show_command(const ShowOptions& options);
+int check_command(const CheckOptions& options, const std::vector<DriverKit>& drivers);
 int export_command(const ExportOptions& options);
 int report_command(const ReportOptions& options);
 int compare_command(const CompareOptions& options);

@@ -79,6 +79,14 @@ void ConfiguredRig::arm() {
   for (Part& part : parts_) part.device->arm();
 }
 
+std::vector<Remark> ConfiguredRig::remarks() const {
+  std::vector<Remark> remarks;
+  for (const Part& part : parts_) {
+    for (Remark& remark : part.device->remarks()) remarks.push_back(std::move(remark));
+  }
+  return remarks;
+}
+
 std::string ConfiguredRig::fault_reason() const {
   for (const Part& part : parts_) {
     const std::string reason = part.device->fault_reason();

@@ -24,6 +24,7 @@ class ConfiguredRig {
   void open();
   void arm();
   std::string fault_reason() const;
+  std::vector<Remark> remarks() const;
   Actuator& actuator() { return *actuator_; }
   const std::vector<Sensor*>& sensors() const { return sensors_; }
 

@@ -14,6 +14,18 @@ CLI::App* add_plan(CLI::App& app, PlanOptions& options) {
   return plan;
 }
 
+CLI::App* add_check(CLI::App& app, CheckOptions& options) {
+  CLI::App* check = app.add_subcommand(
+      "check",
+      "Open a rig and read every channel without moving anything: rate, age, jitter, losses, and "
+      "what would stop a sweep");
+  check->add_option("RIG", options.rig, "rig file (TOML)")->required();
+  check->add_option("--seconds", options.seconds, "how long")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  return check;
+}
+
 CLI::App* add_run(CLI::App& app, RunOptions& options) {
   CLI::App* run = app.add_subcommand("run", "Run the sweep of a rig file and write a sweep file");
   run->add_option("RIG", options.rig, "rig file (TOML)")->required();

@@ -84,6 +84,8 @@ double Guard::ramp_down(std::uint64_t ticks) noexcept {
 }
 
 void Guard::observe_write(const Sample& applied, std::uint64_t tick) noexcept {
+  if (applied.fault == Fault::stale) return;
+  if (applied.fault == Fault::device) trip(TripCause::actuator_fault, 0, 0.0, 0.0, tick);
   write_faults_ = applied.fault == Fault::none ? 0 : write_faults_ + 1;
   if (settings_.max_write_faults != 0 && write_faults_ >= settings_.max_write_faults) {
     trip(TripCause::actuator_fault, 0, write_faults_, settings_.max_write_faults, tick);
@@ -137,7 +139,7 @@ void Guard::trip(TripCause cause, std::uint32_t channel, double value, double li
   changed_ = false;
 }
 
-std::string describe(const Trip& trip, const std::vector<std::string>& channel_names) {
+std::string describe_cause(const Trip& trip, const std::vector<std::string>& channel_names) {
   const std::string name =
       trip.channel < channel_names.size() ? channel_names[trip.channel] : "what was applied";
   const auto with = [&](const char* format, double a, double b) {
@@ -169,8 +171,9 @@ std::string describe(const Trip& trip, const std::vector<std::string>& channel_n
                          trip.limit);
       break;
     case TripCause::actuator_fault:
-      what =
-          with("%.0f faulty writes to the actuator in a row (limit %.0f)", trip.value, trip.limit);
+      what = trip.limit == 0.0 ? "the actuator reports a fault"
+                               : with("%.0f faulty writes to the actuator in a row (limit %.0f)",
+                                      trip.value, trip.limit);
       break;
     case TripCause::excitation_missing:
       what = name + with(
@@ -196,8 +199,16 @@ std::string describe(const Trip& trip, const std::vector<std::string>& channel_n
       break;
     case TripCause::interlock_open: what = name + ": the interlock is open"; break;
   }
-  return what + with(" (tick %.0f; command changed to %.6g)", static_cast<double>(trip.tick),
-                     trip.command);
+  return what;
+}
+
+std::string describe(const Trip& trip, const std::vector<std::string>& channel_names) {
+  const std::string cause = describe_cause(trip, channel_names);
+  if (!trip.tripped()) return cause;
+  char where[80];
+  std::snprintf(where, sizeof where, " (tick %.0f; command changed to %.6g)",
+                static_cast<double>(trip.tick), trip.command);
+  return cause + where;
 }
 
 }  // namespace sinerig

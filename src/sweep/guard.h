@@ -117,4 +117,7 @@ class Guard {
 // One line for people: "gyro = 3.2 is above its maximum 3 at tick 812; command ramped to 0".
 std::string describe(const Trip& trip, const std::vector<std::string>& channel_names);
 
+// The same without tick and command: "gyro = 3.2 is outside its limit 3".
+std::string describe_cause(const Trip& trip, const std::vector<std::string>& channel_names);
+
 }  // namespace sinerig

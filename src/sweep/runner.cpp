@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <complex>
+#include <numbers>
 #include <utility>
 
 namespace sinerig {
@@ -142,7 +144,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
-  measure(tick.index, ticks > 1 || late || command_lost_);
+  measure(tick.index, ticks > 1 || late || command_lost_ || command_late_);
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
   if (dwell_ < dwells_.size()) return true;
   excitation_.close();
@@ -160,7 +162,8 @@ void SweepRunner::exchange(double command, const Tick& tick) noexcept {
   const Sample applied = actuator_.write(command);
   guard_.observe_write(applied, tick.index);
   observe(0, applied);
-  command_lost_ = applied.fault != Fault::none;
+  command_lost_ = applied.fault != Fault::none && applied.fault != Fault::stale;
+  command_late_ = applied.fault == Fault::none && applied_late(observations_[0].offset_ns);
   if (command_lost_) {
     announce({.kind = EventKind::actuator_fault,
               .fault = applied.fault,
@@ -185,6 +188,14 @@ void SweepRunner::exchange(double command, const Tick& tick) noexcept {
     }
     sink_.put_sample(samples);
   }
+}
+
+// A bus that takes a fixed time is no disturbance, one that takes longer than the tick before is.
+bool SweepRunner::applied_late(std::int64_t offset_ns) noexcept {
+  const double change_s = 1e-9 * static_cast<double>(offset_ns - applied_offset_ns_);
+  const bool known = std::exchange(applied_known_, true);
+  applied_offset_ns_ = offset_ns;
+  return known && std::abs(change_s) > settings_.max_lateness * clock_.grid().period_s();
 }
 
 void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
@@ -297,10 +308,16 @@ void SweepRunner::check_excitation(std::uint64_t tick) noexcept {
     guard_.trip(causes[static_cast<std::size_t>(verdict.fault)], sensor, verdict.value,
                 verdict.limit, tick);
   };
-  const std::size_t tones = dwells_[dwell_]->tones.size();
+  const Dwell& dwell = *dwells_[dwell_];
+  const std::size_t tones = dwell.tones.size();
   for (std::size_t tone = 0; tone < tones; ++tone) {
-    refuse(check_applied(measurement_.block_coefficients(0, tone).phasor(),
-                         excitation_.commanded(tone), settings_.min_excitation),
+    // What a bus reports a tick later was applied at the time that it says.
+    const double angle_rad = 2.0e-9 * std::numbers::pi *
+                             dwell.tone_hz(dwell.tones[tone], plan_.rate_hz) *
+                             static_cast<double>(applied_offset_ns_);
+    refuse(check_applied(
+               measurement_.block_coefficients(0, tone).phasor() * std::polar(1.0, -angle_rad),
+               excitation_.commanded(tone), settings_.min_excitation),
            no_sensor);
   }
   if (blocks_ < blocks_before_check) return;

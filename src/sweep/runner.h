@@ -56,6 +56,7 @@ class SweepRunner {
  private:
   bool step(RunControl& control) noexcept SINERIG_NONBLOCKING;
   void exchange(double command, const Tick& tick) noexcept SINERIG_NONBLOCKING;
+  bool applied_late(std::int64_t offset_ns) noexcept SINERIG_NONBLOCKING;
   void measure(std::uint64_t tick, bool disturbed) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
   void put_block(std::uint64_t tick) noexcept;
@@ -94,6 +95,9 @@ class SweepRunner {
   std::uint64_t dwell_ticks_ = 0;  // grid ticks since the dwell began; 0: it has to begin
   bool given_up_ = false;
   bool command_lost_ = false;
+  bool command_late_ = false;
+  bool applied_known_ = false;
+  std::int64_t applied_offset_ns_ = 0;  // of the last command from its tick
   DwellTiming timing_;
   std::uint64_t last_tick_ = 0;
   RunOutcome outcome_;

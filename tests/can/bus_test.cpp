@@ -543,7 +543,7 @@ TEST_F(CanBus, AnUnhealthyDeviceIsAFaultWithAReason) {
   peer.send(frame_of(0x01, {0, 0, 0, 0, 8, 0, 0, 0}));
   EXPECT_EQ(actuator.write(1.0).fault, Fault::none);
   peer.send(frame_of(0x01, {0, 0, 0, 0, 1, 0, 0, 0}));
-  EXPECT_EQ(actuator.write(1.0).fault, Fault::bus);
+  EXPECT_EQ(actuator.write(1.0).fault, Fault::device);
   EXPECT_THAT(actuator.reason(), HasSubstr("axis_state is 1, must be = 8"));
 }
 
@@ -559,7 +559,7 @@ TEST_F(CanBus, AHeartbeatThatStopsIsAFault) {
     ASSERT_EQ(actuator.write(1.0).fault, Fault::none);
   }
   usleep(200'000);
-  EXPECT_EQ(actuator.write(1.0).fault, Fault::bus);
+  EXPECT_EQ(actuator.write(1.0).fault, Fault::device);
   EXPECT_THAT(actuator.reason(), HasSubstr("older than allowed"));
 }
 

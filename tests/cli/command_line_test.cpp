@@ -35,6 +35,31 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
+TEST_F(CommandLine, ChecksARigWithoutMovingIt) {
+  const auto checked = run({"check", "rig.toml", "--seconds", "0.5"});
+  EXPECT_EQ(checked.code, 0) << checked.err;
+  EXPECT_THAT(checked.out, HasSubstr("500 ticks, 0 skipped"));
+  EXPECT_THAT(checked.out, HasSubstr("gyro             1000.00     0.000     0.000     0.000     "
+                                     "0.0000      0  0 rad/s"));
+  EXPECT_THAT(checked.out, HasSubstr("nothing was found that would stop a sweep"));
+}
+
+TEST_F(CommandLine, CheckSaysWhatWouldStopASweep) {
+  std::string text = rig_text;
+  const std::string sensor = "[sensor.gyro]\n";
+  text.insert(text.find(sensor) + sensor.size(), "lost_fraction = 0.2\nbias = 3\nmax = 2\n");
+  text.replace(text.find("amplitude = 0.5"), 15, "amplitude = 9");
+  text.insert(text.find("[limits]\n") + 9, "command_max = 5\n");
+  write("bad.toml", text);
+  const auto checked = run({"check", "bad.toml"});
+  EXPECT_EQ(checked.code, 3) << checked.err;
+  EXPECT_THAT(checked.out, HasSubstr("would stop a sweep:\n"));
+  EXPECT_THAT(checked.out, HasSubstr("gyro = 3 is outside its limit 2\n"));
+  EXPECT_THAT(checked.out, HasSubstr("bad.toml:"));
+  EXPECT_THAT(checked.out, Not(HasSubstr("0.0000      0  3 rad/s"))) << "losses are counted";
+  EXPECT_EQ(run({"check", "none.toml"}).code, 2);
+}
+
 TEST_F(CommandLine, RunsShowsAndExports) {
   const auto ran = run({"run", "rig.toml"});
   EXPECT_EQ(ran.code, 0) << ran.err;

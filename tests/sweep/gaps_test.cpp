@@ -1,7 +1,9 @@
 // The loop under a scripted clock that loses ticks: whole periods are skipped, phase is kept, a
 // block with a gap is void, and the result is as exact as without.
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -202,6 +204,94 @@ TEST(Gaps, InWhichTheMachineSleptStopTheRun) {
             "the loop stood still for 1 s (at most 1 s) (tick 1401; command changed to 0)");
   EXPECT_TRUE(run.released);
   EXPECT_EQ(run.last_command, 0.0);
+}
+
+// A bus that reports the command of the tick before, at the time at which it was applied, and
+// sometimes nothing or late. What the sensor reads is as old.
+class LaggingRig final : public Actuator, public Sensor {
+ public:
+  LaggingRig(const Clock& clock, sim::SimulatedRig& rig) : clock_{clock}, rig_{rig} {}
+
+  Sample write(double command) noexcept override {
+    const std::uint64_t tick = clock_.now().tick;
+    const Sample applied = std::exchange(applied_, rig_.actuator().write(command));
+    read_ = std::exchange(next_read_, rig_.sensor(0).read());
+    const bool nothing_yet = tick == 0;
+    const bool lost = lost_at && lost_at(tick);
+    if (nothing_yet || lost) read_.fault = Fault::stale;
+    Sample answer = applied;
+    if (late_at && late_at(tick)) answer.time_ns += 700'000;
+    if (nothing_yet || lost) answer.fault = Fault::stale;
+    return answer;
+  }
+  void release() noexcept override { rig_.actuator().release(); }
+  Sample read() noexcept override { return read_; }
+
+  std::function<bool(std::uint64_t tick)> lost_at;
+  std::function<bool(std::uint64_t tick)> late_at;
+
+ private:
+  const Clock& clock_;
+  sim::SimulatedRig& rig_;
+  Sample applied_;
+  Sample read_;
+  Sample next_read_;
+};
+
+struct LaggingRun {
+  test::CollectingSink sink;
+  RunOutcome outcome;
+};
+
+LaggingRun run_lagging(const SweepPlan& plan, std::function<bool(std::uint64_t)> lost_at,
+                       std::function<bool(std::uint64_t)> late_at = {}) {
+  LaggingRun run;
+  test::ScriptedClock clock{rate_hz};
+  sim::SimulatedRig rig{test::rig_of(sim::from_transfer_function({pole_rad_s}, {1.0, pole_rad_s})),
+                        clock};
+  LaggingRig lagging{clock, rig};
+  lagging.lost_at = std::move(lost_at);
+  lagging.late_at = std::move(late_at);
+  Sensor* const sensors[] = {&lagging};
+  Guard guard{test::open_guard(1), clock.grid().period_s()};
+  SweepRunner runner{plan, {}, clock, lagging, sensors, guard, run.sink};
+  RunControl control;
+  run.outcome = runner.run(control);
+  return run;
+}
+
+double worst_error(const LaggingRun& run) {
+  const test::PartialFractions lag{.poles = {-60.0L}, .residues = {60.0L}};
+  return test::worst_error(run.sink.points, first_sensor_channel, [&](long double omega) {
+    return test::held_response(lag, omega, 1e-3L);
+  });
+}
+
+TEST(LaggingBus, IsExactBecauseWhatWasAppliedComesWithItsTime) {
+  // At 441 Hz a tick is 159 degrees: no reason to take the sign for wrong.
+  const auto run = run_lagging(plan_of({7.0, 123.0, 441.0}), {});
+  EXPECT_FALSE(run.outcome.trip.tripped());
+  EXPECT_LT(worst_error(run), 1e-9);
+}
+
+TEST(LaggingBus, ALostConfirmationIsAMissingSampleAndNoLostCommand) {
+  const auto run =
+      run_lagging(plan_of({7.0, 123.0}), [](std::uint64_t tick) { return tick % 50 == 7; });
+  EXPECT_FALSE(run.outcome.trip.tripped());
+  EXPECT_LT(worst_error(run), 1e-9);
+  for (const Point& point : run.sink.points) {
+    EXPECT_NEAR(point.lost / (point.lost + point.samples), 0.02, 0.005);
+    EXPECT_EQ(run.sink.timings.at(point.dwell).resettles, 0U);
+  }
+}
+
+TEST(LaggingBus, ACommandLateByMoreThanHalfAPeriodVoidsWhatWasGathered) {
+  const SweepPlan plan = plan_of({10.0});
+  const std::uint64_t second_block = plan.dwells[0].settle_samples + 150;
+  const auto run = run_lagging(plan, {}, [=](std::uint64_t tick) { return tick == second_block; });
+  EXPECT_GT(run.sink.timings.at(0).resettles, 0U);
+  EXPECT_EQ(run.sink.points.at(0).status, PointStatus::good);
+  EXPECT_LT(worst_error(run), 1e-9);
 }
 
 }  // namespace

@@ -196,6 +196,25 @@ TEST(Guard, TakesASingleFaultyWriteForNoDeadActuator) {
   EXPECT_FALSE(guard.trip().tripped());
 }
 
+TEST(Guard, TakesAnUnknownWriteForNeitherGoodNorFaulty) {
+  Guard guard{{.max_write_faults = 2, .channels = {}}, 1e-3};
+  guard.observe_write({.fault = Fault::bus}, 0);
+  for (std::uint64_t tick = 1; tick < 100; ++tick)
+    guard.observe_write({.fault = Fault::stale}, tick);
+  EXPECT_FALSE(guard.trip().tripped());
+  guard.observe_write({.fault = Fault::bus}, 100);
+  EXPECT_EQ(guard.trip().cause, TripCause::actuator_fault);
+}
+
+TEST(Guard, StopsAtOnceWhereTheDeviceItselfReportsAFault) {
+  Guard guard{{.max_write_faults = 50, .channels = {}}, 1e-3};
+  guard.observe_write({.fault = Fault::device}, 3);
+  EXPECT_EQ(guard.trip().cause, TripCause::actuator_fault);
+  EXPECT_EQ(guard.admit(1.0, 4, 1), 0.0);
+  EXPECT_EQ(describe(guard.trip(), {}),
+            "the actuator reports a fault (tick 3; command changed to 0)");
+}
+
 TEST(Guard, WatchesASensorThatNeverAnswersFromTheFirstTick) {
   Guard guard{{.max_age_ns = 5'000'000, .channels = {{}}}, 1e-3};
   for (std::int64_t tick = 0; tick <= 6; ++tick) {

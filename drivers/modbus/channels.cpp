@@ -1,0 +1,200 @@
+#include "drivers/modbus/channels.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <sstream>
+#include <stdexcept>
+#include <utility>
+
+#include "drivers/monotonic_time.h"
+
+namespace sinerig::modbus {
+namespace {
+
+constexpr std::size_t no_rule = static_cast<std::size_t>(-1);
+constexpr std::size_t trial_exchanges = 100;
+constexpr double largest_part_of_period = 0.9;
+constexpr double largest_failed_part = 0.1;
+
+std::string milliseconds(std::int64_t duration_ns) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g ms", static_cast<double>(duration_ns) * 1e-6);
+  return text;
+}
+
+}  // namespace
+
+std::string obstacle(const Link& link, const Pace& pace) {
+  const LinkSettings& settings = link.settings();
+  const std::string where = "[modbus." + settings.connection.name + "] ";
+  std::ostringstream text;
+  if (pace.exchanges == 0 || static_cast<double>(pace.failed) >
+                                 largest_failed_part * static_cast<double>(pace.exchanges)) {
+    text << where << pace.failed << " of " << pace.exchanges
+         << " exchanges failed: " << link.last_failure();
+    return text.str();
+  }
+  const double allowed_ns = largest_part_of_period * static_cast<double>(settings.period_ns);
+  if (static_cast<double>(pace.slow_ns) <= allowed_ns) return "";
+  const double most_hz = largest_part_of_period * 1e9 / static_cast<double>(pace.slow_ns);
+  const double rate_hz = 1e9 / static_cast<double>(settings.period_ns);
+  text.precision(4);
+  text << where << settings.connection.address() << ": an exchange takes "
+       << milliseconds(pace.median_ns) << ", one in twenty more than " << milliseconds(pace.slow_ns)
+       << "; the loop at " << rate_hz << " Hz needs one every " << milliseconds(settings.period_ns)
+       << ": set [loop] rate_hz to " << std::floor(most_hz) << " at most";
+  return text.str();
+}
+
+void require_pace(const Link& link, const Pace& pace) {
+  const std::string what = obstacle(link, pace);
+  if (!what.empty()) throw std::runtime_error(what);
+}
+
+ModbusActuator::ModbusActuator(Link& link, CommandSettings settings)
+    : link_{link}, settings_{std::move(settings)}, violated_{no_rule} {
+  link_.command(settings_.place);
+  for (const HealthRule& rule : settings_.health)
+    health_fields_.push_back(link_.watch(rule.place, "[actuator] health, " + rule.name));
+  health_.resize(settings_.health.size());
+  held_.value = settings_.neutral;
+}
+
+ModbusActuator::~ModbusActuator() {
+  release();
+  if (!started_) return;
+  link_.idle([&](Transport& transport) {
+    if (transport.connected()) run_all(transport, settings_.shutdown);
+  });
+}
+
+void ModbusActuator::start() {
+  started_ = true;
+  link_.idle([&](Transport& transport) { run(transport, settings_.startup, "start-up"); });
+}
+
+// Neutral goes out before the drive is armed: one that finds a stale set-point would jump. A drive
+// may refuse it until it is armed, and then has none.
+void ModbusActuator::arm() {
+  released_ = false;
+  try {
+    link_.idle([&](Transport& transport) {
+      write_number(transport, settings_.place, settings_.neutral, link_.settings().writing,
+                   monotonic_now_ns() + 500'000'000);
+      run(transport, settings_.arm, "arm");
+    });
+    require_pace(link_, link_.try_out(settings_.neutral, trial_exchanges));
+  } catch (...) {
+    release();
+    throw;
+  }
+  link_.set_commanded(true);
+  confirmed_ns_ = monotonic_now_ns();
+  for (Sample& reading : health_)
+    reading = {.value = 0.0, .time_ns = confirmed_ns_, .fault = Fault::stale};
+}
+
+Sample ModbusActuator::write(double command) noexcept {
+  released_ = false;
+  // A command that is no number must not leave the last one standing: neutral goes out instead.
+  const bool a_number = std::isfinite(command);
+  link_.tick(
+      std::clamp(a_number ? command : settings_.neutral, settings_.minimum, settings_.maximum));
+  last_fault_ = judge();
+  look_after_health();
+  if (violated_ != no_rule) last_fault_ = Fault::device;
+  if (!a_number) last_fault_ = Fault::range;
+  Sample answer = held_;
+  answer.fault = last_fault_;
+  return answer;
+}
+
+Fault ModbusActuator::unknown_for_long() const noexcept {
+  const bool long_ago = link_.tick_ns() - confirmed_ns_ > settings_.max_age_ns;
+  return long_ago && settings_.max_age_ns > 0 ? Fault::timeout : Fault::stale;
+}
+
+Fault ModbusActuator::judge() noexcept {
+  if (link_.overrun()) return Fault::timeout;  // the last command has never gone out
+  if (!link_.fresh()) return unknown_for_long();
+  const Exchange& exchange = link_.newest();
+  switch (exchange.fate) {
+    case CommandFate::confirmed:
+      confirmed_ns_ = link_.tick_ns();
+      held_.value = exchange.command;
+      held_.time_ns = exchange.command_ns;
+      return Fault::none;
+    case CommandFate::none:
+    case CommandFate::unconfirmed: return unknown_for_long();
+    case CommandFate::refused:
+    case CommandFate::not_sent: return Fault::bus;
+  }
+  return Fault::bus;
+}
+
+void ModbusActuator::look_after_health() noexcept {
+  violated_ = no_rule;
+  for (std::size_t n = 0; n < health_.size(); ++n) {
+    const Sample& reading = link_.newest().fields[health_fields_[n]];
+    if (link_.fresh() && reading.fault == Fault::none) health_[n] = reading;
+    const bool unknown =
+        settings_.max_age_ns > 0 && link_.tick_ns() - health_[n].time_ns > settings_.max_age_ns;
+    const bool bad =
+        health_[n].fault == Fault::none && !settings_.health[n].comparison.holds(health_[n].value);
+    if (violated_ == no_rule && (bad || unknown)) {
+      violated_ = n;
+      health_is_old_ = !bad;
+    }
+  }
+}
+
+void ModbusActuator::release() noexcept {
+  if (released_) return;
+  released_ = true;
+  if (link_.release(settings_.neutral, settings_.disarm)) held_.value = settings_.neutral;
+}
+
+std::string ModbusActuator::reason() const {
+  if (violated_ != no_rule) {
+    const HealthRule& rule = settings_.health[violated_];
+    std::ostringstream text;
+    text << rule.name;
+    if (health_is_old_)
+      text << " could not be read: " << link_.last_failure();
+    else
+      text << " is " << health_[violated_].value << ", must be " << rule.comparison.text();
+    return text.str();
+  }
+  const std::string failure = link_.last_failure();
+  if (last_fault_ == Fault::timeout && failure.empty())
+    return "the device does not keep up with the loop";
+  return failure;
+}
+
+ModbusSensor::ModbusSensor(Link& link, const FeedbackSettings& settings, const std::string& label,
+                           bool paces)
+    : link_{link},
+      field_{link.watch(settings.place, label)},
+      unwrapper_{settings.wrap_modulus},
+      paces_{paces} {}
+
+Sample ModbusSensor::read() noexcept {
+  if (paces_ && !link_.commanded()) link_.tick(std::nullopt);
+  if (!link_.fresh()) {
+    last_.fault = Fault::stale;
+    return last_;
+  }
+  const Sample& reading = link_.newest().fields[field_];
+  last_.fault = reading.fault;
+  if (reading.fault != Fault::none) return last_;
+  if (!std::isfinite(reading.value)) {
+    last_.fault = Fault::range;
+    return last_;
+  }
+  last_.value = unwrapper_.apply(reading.value);
+  last_.time_ns = reading.time_ns;
+  return last_;
+}
+
+}  // namespace sinerig::modbus

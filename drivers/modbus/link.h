@@ -1,0 +1,141 @@
+// One connection in the loop: its own thread asks and waits, paced by the loop's ticks; the loop
+// hands a command over and takes the newest exchange, and never waits.
+//
+// tick() takes the exchange that has ended before it hands the next one over: what a tick sees does
+// not depend on how fast the thread is. Outside the loop the connection is used under idle().
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "drivers/mailbox.h"
+#include "drivers/modbus/exchange.h"
+#include "drivers/modbus/sequence.h"
+#include "drivers/modbus/transport.h"
+#include "sweep/nonblocking.h"
+
+namespace sinerig::modbus {
+
+struct LinkSettings {
+  ConnectionSettings connection;
+  Writing writing = Writing::automatic;
+  std::int64_t period_ns = 0;            // of the loop
+  std::int64_t response_timeout_ns = 0;  // of a whole exchange
+  std::size_t read_through = 0;
+};
+
+// How long exchanges take: of those since the last summary.
+struct Pace {
+  std::size_t exchanges = 0;
+  std::size_t failed = 0;
+  std::int64_t median_ns = 0;
+  std::int64_t slow_ns = 0;  // 95 % take less
+  std::int64_t worst_ns = 0;
+};
+
+class Link {
+ public:
+  explicit Link(LinkSettings settings);
+  ~Link();
+  Link(const Link&) = delete;
+  Link& operator=(const Link&) = delete;
+
+  // Before open(): a number to be read at every tick; its index among the fields of an exchange.
+  std::size_t watch(const Place& place, std::string label);
+  void command(const Place& place) { command_ = place; }
+
+  // Connects, reads everything once, starts the thread. Throws std::runtime_error.
+  void open();
+
+  // Outside the loop, with the thread at rest.
+  template <class Use>
+  auto idle(Use use) {
+    const std::scoped_lock lock{mutex_};
+    return use(transport_);
+  }
+
+  // Exchanges as in the loop, outside of it; with a command where one is given. Falls back from
+  // function 23 to 16 where the device does not know it and the rig file leaves the choice.
+  Pace try_out(std::optional<double> command, std::size_t exchanges);
+  std::string last_failure() const;
+  Pace pace() const;  // of the loop so far
+  TransportCounters counters() const;
+
+  // From now on ticks carry a command, and only they pace the exchanges.
+  void set_commanded(bool commanded) noexcept { commanded_ = commanded; }
+  bool commanded() const noexcept { return commanded_; }
+
+  // The loop's.
+  void tick(std::optional<double> command) noexcept SINERIG_NONBLOCKING;
+  bool fresh() const noexcept { return fresh_; }      // an exchange has ended since the last tick
+  bool overrun() const noexcept { return overrun_; }  // the last order was never taken up
+  std::int64_t tick_ns() const noexcept { return tick_ns_; }
+  const Exchange& newest() const noexcept { return newest_; }
+
+  // Neutral at once, whatever the loop has handed over, then `disarm`. Bounded in time.
+  bool release(double neutral, const Sequence& disarm) noexcept;
+
+  const LinkSettings& settings() const noexcept { return settings_; }
+
+ private:
+  struct Order {
+    std::uint64_t number = 0;
+    std::int64_t handed_over_ns = 0;
+    bool commands = false;
+    double command = 0.0;
+  };
+
+  void serve() noexcept;
+  void serve_one() noexcept;
+  void perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept;
+  void make_plans();
+  void find_spare_registers();
+  void note_duration(const Exchange& exchange, bool failed) noexcept;
+  void reconnect_now_and_then() noexcept;
+  Pace summary(std::vector<std::int64_t> durations, std::size_t failed) const;
+
+  static constexpr std::size_t kept_durations = 4096;
+  static constexpr std::int64_t reconnect_period_ns = 100'000'000;
+
+  LinkSettings settings_;
+  std::vector<Place> places_;
+  std::vector<std::string> labels_;
+  std::optional<Place> command_;
+
+  // The loop's.
+  Mailbox<Order> orders_;      // loop → thread
+  Mailbox<Exchange> results_;  // thread → loop
+  Exchange newest_;
+  std::uint64_t number_ = 0;
+  std::int64_t tick_ns_ = 0;
+  bool fresh_ = false;
+  bool overrun_ = false;
+  bool commanded_ = false;
+
+  // Whoever holds the mutex: the thread for an exchange, others between them.
+  mutable std::mutex mutex_;
+  Transport transport_;
+  std::vector<Request> spares_;  // what was found out about what can be read beyond what is wanted
+  std::uint64_t asked_ = 0;
+  ExchangePlan reading_plan_;
+  ExchangePlan commanding_plan_;
+  std::array<std::uint16_t, max_read_registers> registers_{};
+  std::vector<std::int64_t> durations_;
+  std::size_t next_duration_ = 0;
+  std::size_t failed_ = 0;
+  Answer failure_;
+  bool has_failed_ = false;
+  std::int64_t next_reconnect_ns_ = 0;
+
+  int wake_ = -1;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+}  // namespace sinerig::modbus

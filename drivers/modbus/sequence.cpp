@@ -1,0 +1,130 @@
+#include "drivers/modbus/sequence.h"
+
+#include <chrono>
+#include <sstream>
+#include <stdexcept>
+#include <thread>
+
+#include "drivers/monotonic_time.h"
+
+namespace sinerig::modbus {
+namespace {
+
+constexpr std::int64_t answer_ns = 500'000'000;
+constexpr std::chrono::milliseconds between_readings{5};
+constexpr std::chrono::milliseconds before_retry{20};
+
+struct Reading {
+  Answer answer;
+  double value = 0.0;
+};
+
+Reading read_number(Transport& transport, const Place& place, std::int64_t deadline_ns) noexcept {
+  Request question;
+  question.unit = place.unit;
+  question.function = place.table == Table::holding ? Function::read_holding : Function::read_input;
+  question.read_address = place.address;
+  question.read_count = static_cast<std::uint16_t>(place.words());
+  std::array<std::uint16_t, max_words> registers{};
+  Reading reading;
+  reading.answer = transport.ask(question, deadline_ns, registers);
+  if (reading.answer.outcome == Outcome::ok) reading.value = decode(registers, place.format);
+  return reading;
+}
+
+bool done(const Answer& answer) noexcept {
+  return answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
+}
+
+// Outside the loop a lost answer is worth a second try; a refusal is final.
+Answer write_surely(Transport& transport, const Step& step) noexcept {
+  Answer answer;
+  const Writing writing = step.single ? Writing::single : Writing::multiple;
+  for (int n = 0; n < 3; ++n) {
+    if (n > 0) std::this_thread::sleep_for(before_retry);
+    answer =
+        write_number(transport, step.place, *step.write, writing, monotonic_now_ns() + answer_ns);
+    if (done(answer) || !transport.connected()) break;
+  }
+  return answer;
+}
+
+void pause(std::int64_t delay_ns) noexcept {
+  if (delay_ns > 0) std::this_thread::sleep_for(std::chrono::nanoseconds{delay_ns});
+}
+
+// Empty when the step was done, else what went wrong.
+std::string perform(Transport& transport, const Step& step) {
+  if (step.write) {
+    const Answer answer = write_surely(transport, step);
+    if (answer.outcome != Outcome::ok) return transport.describe(answer);
+  }
+  if (step.expect) {
+    const std::int64_t until_ns = monotonic_now_ns() + step.timeout_ns;
+    for (;;) {
+      const Reading reading = read_number(transport, step.place, monotonic_now_ns() + answer_ns);
+      const bool believed = reading.answer.outcome == Outcome::ok;
+      if (believed && step.expect->holds(reading.value)) break;
+      const bool hopeless = reading.answer.outcome == Outcome::exception || !transport.connected();
+      if (hopeless || monotonic_now_ns() >= until_ns) {
+        if (!believed) return transport.describe(reading.answer);
+        std::ostringstream text;
+        text << "register " << step.place.address << " is " << reading.value << ", must be "
+             << step.expect->text() << " within " << static_cast<double>(step.timeout_ns) * 1e-9
+             << " s";
+        return text.str();
+      }
+      std::this_thread::sleep_for(between_readings);
+    }
+  }
+  pause(step.delay_ns);
+  return "";
+}
+
+}  // namespace
+
+bool Comparison::holds(double measured) const noexcept {
+  switch (sign) {
+    case Operator::equal: return measured == value;
+    case Operator::not_equal: return measured != value;
+    case Operator::at_most: return measured <= value;
+    case Operator::at_least: return measured >= value;
+  }
+  return false;
+}
+
+std::string Comparison::text() const {
+  static constexpr const char* signs[] = {"= ", "not ", "<= ", ">= "};
+  std::ostringstream text;
+  text << signs[static_cast<int>(sign)] << value;
+  return text.str();
+}
+
+Answer write_number(Transport& transport, const Place& place, double value, Writing writing,
+                    std::int64_t deadline_ns) noexcept {
+  Request request;
+  request.unit = place.unit;
+  request.function = writing == Writing::single ? Function::write_single : Function::write_multiple;
+  request.write_address = place.address;
+  request.write_count = static_cast<std::uint16_t>(place.words());
+  encode(request.words, place.format, value);
+  return transport.ask(request, deadline_ns, {});
+}
+
+void run(Transport& transport, const Sequence& sequence, const std::string& list) {
+  for (const Step& step : sequence) {
+    const std::string wrong = perform(transport, step);
+    if (!wrong.empty()) throw std::runtime_error(list + ", " + step.name + ": " + wrong);
+  }
+}
+
+bool run_all(Transport& transport, const Sequence& sequence) noexcept {
+  bool all = true;
+  for (const Step& step : sequence) {
+    if (step.write) all = write_surely(transport, step).outcome == Outcome::ok && all;
+    pause(step.delay_ns);
+  }
+  return all;
+}
+
+}  // namespace sinerig::modbus

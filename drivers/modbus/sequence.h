@@ -1,0 +1,44 @@
+// What is done once, outside the loop: lists of registers to write and of values to wait for.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "drivers/modbus/exchange.h"
+#include "drivers/modbus/transport.h"
+
+namespace sinerig::modbus {
+
+struct Comparison {
+  enum class Operator : std::uint8_t { equal, not_equal, at_most, at_least };
+  Operator sign = Operator::equal;
+  double value = 0.0;
+
+  bool holds(double measured) const noexcept;
+  std::string text() const;  // "= 1"
+};
+
+struct Step {
+  std::string name;
+  Place place;
+  bool single = false;  // written by function 6 instead of 16
+  std::optional<double> write;
+  std::optional<Comparison> expect;  // read again until it holds
+  std::int64_t timeout_ns = 500'000'000;
+  std::int64_t delay_ns = 0;  // afterwards
+};
+using Sequence = std::vector<Step>;
+
+// Throws std::runtime_error naming the list, the step and what the device said.
+void run(Transport& transport, const Sequence& sequence, const std::string& list);
+
+// Every step whatever becomes of the others, for ways out. True when all was done.
+bool run_all(Transport& transport, const Sequence& sequence) noexcept;
+
+// Writes one number; `deadline_ns` as Transport::ask.
+Answer write_number(Transport& transport, const Place& place, double value, Writing writing,
+                    std::int64_t deadline_ns) noexcept;
+
+}  // namespace sinerig::modbus

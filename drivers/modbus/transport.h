@@ -1,0 +1,129 @@
+// One connection, TCP or serial line, and one question at a time on it, answered by a deadline.
+// Answers that come after theirs are recognised and dropped: taken for the next answer they would
+// make every later sample one period old, which looks like a clean phase lag. TCP frames have a
+// number. Serial frames have none: there answers are told apart by their length, where the device
+// lets more be read than is wanted; elsewhere nothing is read, after a time-out, until the late
+// answer has come or can no longer come. Set-points go out meanwhile.
+//
+// Not thread-safe. Nothing in it is for the loop.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "drivers/modbus/request.h"
+
+struct _modbus;
+
+namespace sinerig::modbus {
+
+// Who switches the transmitter of a half-duplex line: nobody or the adapter, the kernel's serial
+// driver, or this program through RTS.
+enum class Rs485 : std::uint8_t { adapter, kernel, rts_up, rts_down };
+
+struct ConnectionSettings {
+  std::string name;  // of its section: [modbus.NAME]
+  bool serial = false;
+  std::string host;
+  int port = 502;
+  std::string device;
+  int baud = 115200;
+  char parity = 'E';  // 'N', 'E' or 'O'
+  int stop_bits = 1;
+  Rs485 rs485 = Rs485::adapter;
+
+  std::string address() const { return serial ? device : host + ":" + std::to_string(port); }
+};
+
+enum class Outcome : std::uint8_t {
+  ok,
+  timeout,
+  exception,     // the device refused
+  spoiled,       // wrong check sum, or no Modbus
+  disconnected,  // connection closed, device file gone
+};
+
+struct Answer {
+  Outcome outcome = Outcome::disconnected;
+  std::uint8_t exception = 0;
+  bool write_only = false;  // nothing was read: a late answer may still be under way
+  int error = 0;            // errno of libmodbus
+  std::int64_t sent_ns = 0;
+  std::int64_t received_ns = 0;
+  std::int64_t time_ns = 0;  // middle of when the device can have acted
+};
+
+struct TransportCounters {
+  std::uint64_t asked = 0;
+  std::uint64_t timeouts = 0;
+  std::uint64_t late_answers = 0;  // recognised and dropped
+  std::uint64_t spoiled = 0;
+  std::uint64_t exceptions = 0;
+  std::uint64_t connections = 0;
+};
+
+class Transport {
+ public:
+  explicit Transport(ConnectionSettings settings);
+  ~Transport();
+  Transport(const Transport&) = delete;
+  Transport& operator=(const Transport&) = delete;
+
+  // Throws std::runtime_error saying what to look at.
+  void connect();
+  bool try_connect() noexcept;
+  void disconnect() noexcept;
+  bool connected() const noexcept { return connected_; }
+
+  // Asks and waits until `deadline_ns` (CLOCK_MONOTONIC) at most; `registers` takes what is read.
+  // A lost connection is closed.
+  Answer ask(const Request& request, std::int64_t deadline_ns,
+             std::span<std::uint16_t> registers) noexcept;
+
+  // Serial lines: finds out whether the adapter returns what is sent. `request` must only read.
+  void look_for_echo(const Request& request) noexcept;
+  bool echoes() const noexcept { return echoes_; }
+
+  // Time that a reply and its request take on the wire at least; 0 on TCP.
+  std::int64_t wire_ns(std::size_t bytes) const noexcept;
+
+  std::string describe(const Answer& answer) const;
+  const ConnectionSettings& settings() const noexcept { return settings_; }
+  const TransportCounters& counters() const noexcept { return counters_; }
+
+ private:
+  struct Close {
+    void operator()(_modbus* context) const noexcept;
+  };
+
+  bool send(const RequestBytes& request) noexcept;
+  void receive(const Request& request, std::int64_t deadline_ns, std::span<std::uint16_t> registers,
+               Answer& answer) noexcept;
+  bool discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept;
+  void take_in_late_answers() noexcept;
+  bool could_be_mistaken(const Request& request) const noexcept;
+  void expect_late(const Request& request, std::int64_t until_ns) noexcept;
+  void forget_late(std::span<const std::uint8_t> pdu) noexcept;
+  void clear_input() noexcept;
+  int pending() const noexcept;
+  int socket() const noexcept;
+
+  ConnectionSettings settings_;
+  std::unique_ptr<_modbus, Close> context_;
+  TransportCounters counters_;
+  std::uint16_t transaction_ = 0;
+  bool connected_ = false;
+  bool echoes_ = false;
+
+  // Serial: answers that may still come, by what tells them apart.
+  struct Late {
+    std::uint8_t function = 0;
+    std::size_t size = 0;
+    std::int64_t until_ns = 0;
+  };
+  std::array<Late, 8> late_{};
+};
+
+}  // namespace sinerig::modbus

@@ -1,0 +1,362 @@
+// The driver against a simulated drive in this process, over loopback TCP and a pseudo-terminal, as
+// fast as the exchanges go: no test waits for a time, each waits for an exchange.
+#include <atomic>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <thread>
+#include <unistd.h>
+
+#include <gmock/gmock.h>
+
+#include "drivers/modbus/channels.h"
+#include "drivers/monotonic_time.h"
+#include "sim/modbus_drive/server.h"
+
+namespace sinerig::modbus {
+namespace {
+
+using testing::HasSubstr;
+using testing::ThrowsMessage;
+
+constexpr std::int64_t generous_ns = 2'000'000'000;
+
+std::string line_path() {
+  return (std::filesystem::temp_directory_path() /
+          ("sinerig-modbus-test-" + std::to_string(getpid())))
+      .string();
+}
+
+sim::DriveSettings drive_settings(bool serial) {
+  sim::DriveSettings settings;
+  settings.serial = serial;
+  settings.link = line_path();
+  settings.baud = 1'000'000;
+  settings.type = "float64";
+  sim::MechanicalAxis axis;
+  axis.inertia = 0.02;
+  axis.damping = 0.5;
+  axis.stiffness = 3.0;
+  settings.system = sim::from_mechanical_axis(axis);
+  return settings;
+}
+
+// A drive on its own thread for as long as this lives.
+class RunningDrive {
+ public:
+  explicit RunningDrive(sim::DriveSettings settings)
+      : server_{std::move(settings)}, thread_{[this] {
+          server_.run(stop_, 1e9, 0.01);
+        }} {}
+  ~RunningDrive() {
+    stop_.store(true);
+    thread_.join();
+  }
+  int port() const {
+    const std::string address = server_.address();
+    return std::stoi(address.substr(address.rfind(':') + 1));
+  }
+
+ private:
+  sim::DriveServer server_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+Place number_at(std::uint16_t address) {
+  return {.unit = 1,
+          .table = Table::holding,
+          .address = address,
+          .format = {.type = RegisterType::float64}};
+}
+
+Place word_at(std::uint16_t address) {
+  return {.unit = 1, .table = Table::holding, .address = address, .format = {}};
+}
+
+struct Rig {
+  explicit Rig(sim::DriveSettings settings)
+      : serial{settings.serial}, drive{std::move(settings)}, link{link_settings()} {}
+
+  LinkSettings link_settings() const {
+    LinkSettings settings;
+    settings.connection.name = "drive";
+    settings.connection.serial = serial;
+    settings.connection.device = line_path();
+    settings.connection.baud = 1'000'000;
+    settings.connection.host = "127.0.0.1";
+    settings.connection.port = serial ? 0 : drive.port();
+    settings.period_ns = generous_ns;
+    settings.response_timeout_ns = timeout_ns;
+    settings.read_through = 8;  // one question for all
+    return settings;
+  }
+
+  static Step write(const char* name, double value) {
+    Step step;
+    step.name = name;
+    step.place = word_at(0);
+    step.write = value;
+    return step;
+  }
+  static Step expect_on() {
+    Step step;
+    step.name = "enabled";
+    step.place = word_at(32);
+    step.expect = Comparison{.sign = Comparison::Operator::equal, .value = 1.0};
+    return step;
+  }
+  static CommandSettings command() {
+    CommandSettings settings;
+    settings.place = number_at(16);
+    settings.arm = {write("enable", 1.0), expect_on()};
+    settings.disarm = {write("disable", 0.0)};
+    settings.health = {{.name = "state",
+                        .place = word_at(32),
+                        .comparison = {.sign = Comparison::Operator::equal, .value = 1.0}}};
+    return settings;
+  }
+
+  void open() {
+    actuator.emplace(link, command());
+    position.emplace(link, FeedbackSettings{number_at(34)}, "[sensor.position]", true);
+    torque.emplace(link, FeedbackSettings{number_at(42)}, "[sensor.torque]", false);
+    link.open();
+    actuator->start();
+  }
+
+  // A tick when the exchange before has ended.
+  Sample tick(double command) {
+    Sample applied = actuator->write(command);
+    while (applied.fault == Fault::stale && !link.fresh()) {
+      std::this_thread::yield();
+      applied = actuator->write(command);
+    }
+    return applied;
+  }
+
+  bool serial;
+  std::int64_t timeout_ns = generous_ns / 2;
+  RunningDrive drive;
+  Link link;
+  std::optional<ModbusActuator> actuator;
+  std::optional<ModbusSensor> position;
+  std::optional<ModbusSensor> torque;
+};
+
+class ModbusLink : public testing::TestWithParam<bool> {};
+
+TEST_P(ModbusLink, EveryExchangeTellsWhatItAppliedAndWhatItReadThen) {
+  Rig rig{drive_settings(GetParam())};
+  rig.open();
+  rig.actuator->arm();
+  std::int64_t last_ns = 0;
+  int fresh = 0;
+  for (int n = 1; fresh < 200; ++n) {
+    // Orders that are replaced before they were taken up never go out: only what is reported did.
+    const Sample applied = rig.actuator->write(1e-6 * n);
+    const Sample torque = rig.torque->read();
+    if (applied.fault != Fault::none) {
+      std::this_thread::yield();
+      continue;
+    }
+    ++fresh;
+    ASSERT_EQ(torque.fault, Fault::none);
+    ASSERT_EQ(torque.value, applied.value) << "read by the question that wrote it";
+    ASSERT_EQ(torque.time_ns, applied.time_ns);
+    ASSERT_GT(applied.time_ns, last_ns);
+    ASSERT_LE(applied.time_ns, monotonic_now_ns());
+    last_ns = applied.time_ns;
+  }
+  EXPECT_EQ(rig.actuator->reason(), "");
+}
+
+TEST_P(ModbusLink, IsReadWithoutACommandUntilItIsArmed) {
+  Rig rig{drive_settings(GetParam())};
+  rig.open();
+  Sample position = rig.position->read();
+  while (position.fault != Fault::none) {
+    std::this_thread::yield();
+    position = rig.position->read();
+  }
+  EXPECT_EQ(position.value, 0.0);
+  EXPECT_EQ(rig.link.newest().fate, CommandFate::none);
+}
+
+TEST_P(ModbusLink, ReleaseWritesNeutralAndDisarmsWhateverWasHandedOver) {
+  Rig rig{drive_settings(GetParam())};
+  rig.open();
+  rig.actuator->arm();
+  while (rig.tick(3.0).value != 3.0) {
+  }
+  rig.actuator->write(4.0);
+  rig.actuator->release();
+  rig.actuator->release();
+  const auto number = [&](const Place& place) {
+    return rig.link.idle([&](Transport& transport) {
+      std::array<std::uint16_t, max_words> registers{};
+      Request question;
+      question.read_address = place.address;
+      question.read_count = static_cast<std::uint16_t>(place.words());
+      transport.ask(question, monotonic_now_ns() + generous_ns, registers);
+      return decode(registers, place.format);
+    });
+  };
+  EXPECT_EQ(number(number_at(16)), 0.0);
+  EXPECT_EQ(number(number_at(42)), 0.0);
+  EXPECT_EQ(number(word_at(32)), 0.0);
+}
+
+TEST_P(ModbusLink, ADriveWithoutFunction23IsWrittenAndReadByTwoQuestions) {
+  sim::DriveSettings settings = drive_settings(GetParam());
+  settings.has_function_23 = false;
+  Rig rig{settings};
+  rig.open();
+  rig.actuator->arm();
+  EXPECT_EQ(rig.link.settings().writing, Writing::multiple);
+  while (rig.tick(0.25).value != 0.25) {
+  }
+  EXPECT_EQ(rig.torque->read().value, 0.25);
+}
+
+TEST_P(ModbusLink, ATrippedDriveIsAFaultWithAReason) {
+  sim::DriveSettings settings = drive_settings(GetParam());
+  settings.faults.error_at_s = 1e-9;  // at the first turn: before it is armed
+  Rig rig{settings};
+  rig.open();
+  EXPECT_THAT([&] { rig.actuator->arm(); },
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr("arm, enabled: register 32 is 2, must be = 1 within 0.5 s")));
+}
+
+TEST_P(ModbusLink, RefusesADriveThatMostlyRefuses) {
+  sim::DriveSettings settings = drive_settings(GetParam());
+  settings.faults.exception_fraction = 0.3;
+  settings.faults.seed = 4;
+  Rig rig{settings};
+  rig.actuator.emplace(rig.link, [] {
+    CommandSettings command;
+    command.place = number_at(16);
+    return command;
+  }());
+  rig.link.open();
+  EXPECT_THAT([&] { rig.actuator->arm(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("exception 4, device failure")));
+}
+
+INSTANTIATE_TEST_SUITE_P(Over, ModbusLink, testing::Values(false, true),
+                         [](const auto& over) { return over.param ? "Rtu" : "Tcp"; });
+
+TEST(ModbusPace, RefusesADeviceThatIsSlowerThanTheLoop) {
+  sim::DriveSettings settings = drive_settings(false);
+  settings.turn_around_ns = 3'000'000;
+  Rig rig{settings};
+  rig.open();
+  const Pace pace = rig.link.try_out(std::nullopt, 10);
+  EXPECT_EQ(obstacle(rig.link, pace), "");
+
+  LinkSettings fast = rig.link_settings();
+  fast.period_ns = 2'000'000;
+  Link faster{fast};
+  const Pace slow{.exchanges = 100, .failed = 0, .median_ns = 3'100'000, .slow_ns = 3'600'000};
+  EXPECT_THAT(obstacle(faster, slow),
+              HasSubstr("an exchange takes 3.1 ms, one in twenty more than 3.6 ms; the loop at 500 "
+                        "Hz needs one every 2 ms: set [loop] rate_hz to 250 at most"));
+  EXPECT_THAT([&] { require_pace(faster, slow); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("rate_hz")));
+}
+
+TEST(ModbusOpening, SaysWhichChannelAsksForARegisterThatIsNotThere) {
+  Rig rig{drive_settings(false)};
+  rig.link.watch(number_at(1000), "[sensor.angle]");
+  EXPECT_THAT([&] { rig.link.open(); }, ThrowsMessage<std::runtime_error>(testing::AllOf(
+                                            HasSubstr("[sensor.angle], register 1000 of unit 1"),
+                                            HasSubstr("exception 2, illegal data address"))));
+}
+
+TEST(ModbusOpening, SaysThatNobodyListens) {
+  int port = 0;
+  {
+    const RunningDrive gone{drive_settings(false)};
+    port = gone.port();
+  }
+  LinkSettings settings;
+  settings.connection.name = "drive";
+  settings.connection.host = "127.0.0.1";
+  settings.connection.port = port;
+  Link link{settings};
+  link.watch(word_at(0), "[sensor.s]");
+  EXPECT_THAT([&] { link.open(); },
+              ThrowsMessage<std::runtime_error>(testing::AllOf(
+                  HasSubstr("[modbus.drive] 127.0.0.1:"), HasSubstr("are host and port right?"))));
+}
+
+TEST(ModbusOpening, FindsAnAdapterThatReturnsWhatIsSent) {
+  for (const bool echo : {false, true}) {
+    sim::DriveSettings settings = drive_settings(true);
+    settings.echo = echo;
+    Rig rig{settings};
+    rig.open();
+    const bool found = rig.link.idle([](Transport& transport) { return transport.echoes(); });
+    EXPECT_EQ(found, echo);
+    rig.actuator->arm();
+    while (rig.tick(0.5).value != 0.5) {
+    }
+    EXPECT_EQ(rig.torque->read().value, 0.5);
+  }
+}
+
+// Answers after their time-outs, one after the other too: none may be taken for that of another
+// question, by its number, by its length, or because nothing is asked until it has come.
+struct LateCase {
+  const char* name;
+  bool serial;
+  std::uint16_t spare;
+};
+
+class ModbusLateAnswers : public testing::TestWithParam<LateCase> {};
+
+TEST_P(ModbusLateAnswers, AreNeverTakenForAnother) {
+  const auto& [name, serial, spare] = GetParam();
+  for (const double fraction : {0.3, 1.0}) {
+    sim::DriveSettings settings = drive_settings(serial);
+    settings.faults.late_fraction = fraction;
+    settings.faults.late_s = 0.012;
+    const RunningDrive drive{settings};
+    ConnectionSettings connection;
+    connection.serial = serial;
+    connection.device = line_path();
+    connection.baud = 1'000'000;
+    connection.host = "127.0.0.1";
+    connection.port = serial ? 0 : drive.port();
+    Transport transport{connection};
+    transport.connect();
+    const Place place = number_at(16);
+    int believed = 0;
+    for (int n = 1; n <= 150; ++n) {
+      Request question;
+      question.function = Function::write_and_read;
+      question.read_address = 16;
+      question.read_count = static_cast<std::uint16_t>(4 + n % (spare + 1));
+      question.write_address = 16;
+      question.write_count = 4;
+      const double sent = encode(question.words, place.format, n);
+      std::array<std::uint16_t, max_read_registers> registers{};
+      const Answer answer = transport.ask(question, monotonic_now_ns() + 10'000'000, registers);
+      if (answer.outcome != Outcome::ok || answer.write_only) continue;
+      ++believed;
+      ASSERT_EQ(decode(registers, place.format), sent) << "question " << n;
+    }
+    EXPECT_GE(believed, fraction < 1.0 ? 10 : 0);
+    EXPECT_GT(transport.counters().late_answers, 10U);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(ToldApart, ModbusLateAnswers,
+                         testing::Values(LateCase{"ByNumber", false, 0},
+                                         LateCase{"ByLength", true, 3},
+                                         LateCase{"ByWaiting", true, 0}),
+                         [](const auto& late) { return late.param.name; });
+
+}  // namespace
+}  // namespace sinerig::modbus

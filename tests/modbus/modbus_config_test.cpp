@@ -1,0 +1,94 @@
+#include "drivers/modbus/modbus_config.h"
+
+#include <filesystem>
+
+#include <gmock/gmock.h>
+
+#include "config/rig.h"
+#include "drivers/modbus/modbus_driver.h"
+
+namespace sinerig::modbus {
+namespace {
+
+using config::ConfigError;
+using config::RigFile;
+using testing::HasSubstr;
+
+constexpr const char* tcp = "[modbus.drive]\nhost = \"10.0.0.5\"\n";
+constexpr const char* actuator =
+    "[actuator]\ndriver = \"modbus\"\nconnection = \"drive\"\nregister = 16\n";
+constexpr const char* sensor =
+    "[sensor.s]\ndriver = \"modbus\"\nconnection = \"drive\"\nregister = 34\n";
+
+// What is said about a rig with these sections; empty when it is accepted.
+std::string refusal(const std::string& sections) {
+  try {
+    const config::Rig rig = config::read_rig(
+        RigFile::parse("[loop]\nrate_hz = 100\n[sweep]\nstart_hz = 1\nstop_hz = 10\npoints = 3\n"
+                       "amplitude = 0.1\n[limits]\n" +
+                           sections,
+                       "rig.toml"));
+    modbus_driver().configure({rig, &rig.actuator, {&rig.sensors.front()}});
+    rig.file->refuse_unread();
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string with(const std::string& connection, const std::string& command = "",
+                 const std::string& feedback = "") {
+  return connection + actuator + command + sensor + feedback;
+}
+
+TEST(ModbusConfig, AcceptsWhatTheShippedRigsSay) {
+  EXPECT_EQ(refusal(with(tcp)), "");
+  EXPECT_EQ(refusal(with(tcp, "type = \"int32\"\nscale = 0.001\n", "table = \"input\"\n")), "");
+}
+
+TEST(ModbusConfig, RefusalsNameFileLineKeyAndRule) {
+  EXPECT_THAT(refusal(std::string{actuator} + sensor),
+              HasSubstr("rig.toml:11: [actuator] connection = 'drive': there is no section "
+                        "[modbus.drive]"));
+  EXPECT_THAT(refusal("[modbus.other]\nhost = \"h\"\n" + std::string{actuator} + sensor),
+              HasSubstr("there is no such section [modbus.NAME]; there is \"other\""));
+  EXPECT_THAT(refusal(with("[modbus.drive]\n")), HasSubstr("[modbus.drive] host: is missing"));
+  EXPECT_THAT(refusal(with("[modbus.drive]\ntransport = \"rtu\"\ndevice = \"/dev/x\"\n"
+                           "baud = 12345\n")),
+              HasSubstr("[modbus.drive] baud = 12345: must be one of 1200 2400"));
+  EXPECT_THAT(refusal(with(std::string{tcp} + "device = \"/dev/x\"\n")),
+              HasSubstr("[modbus.drive] device: unknown key"));
+  EXPECT_THAT(refusal(with(std::string{tcp} + "response_timeout_s = 0.01\n")),
+              HasSubstr("response_timeout_s = 0.01: must be at least 1e-05 and at most 0.009"));
+  EXPECT_THAT(refusal(with(std::string{tcp} + "exchange = \"fc6\"\n", "type = \"int32\"\n")),
+              HasSubstr("[actuator] type = 'int32': function 6 writes one register"));
+  EXPECT_THAT(refusal(with(tcp, "scale = 0\n")), HasSubstr("scale = 0: must not be 0"));
+  EXPECT_THAT(refusal(with(tcp, "table = \"input\"\n")),
+              HasSubstr("[actuator] table: unknown key"));
+  EXPECT_THAT(refusal(with(tcp, "clamp_min = 2\nclamp_max = 1\n")),
+              HasSubstr("clamp_min = 2: must be below clamp_max"));
+  EXPECT_THAT(refusal(with(tcp, "", "type = \"float33\"\n")),
+              HasSubstr("must be one of \"uint16\" \"int16\""));
+  EXPECT_THAT(refusal(with(tcp, "[[actuator.arm]]\nregister = 1\nvalue = 1\n")),
+              HasSubstr("[actuator.arm[1]] name: is missing"));
+  EXPECT_THAT(
+      refusal(with(tcp, "[[actuator.arm]]\nname = \"x\"\nregister = 1\nequals = 1\nnot = 2\n")),
+      HasSubstr("stands beside another comparison"));
+  EXPECT_THAT(refusal(with(tcp, "[[actuator.health]]\nname = \"x\"\nregister = 1\n")),
+              HasSubstr("needs exactly one of equals, not, at_most, at_least"));
+  const std::string at_the_end = std::string{tcp} + actuator +
+                                 "[sensor.s]\ndriver = \"modbus\"\nconnection = \"drive\"\n"
+                                 "register = 65535\ntype = \"float32\"\n";
+  EXPECT_THAT(refusal(at_the_end), HasSubstr("does not end before register 65536"));
+}
+
+TEST(ModbusConfig, LeavesTimeInThePeriod) {
+  const auto file = RigFile::parse("[modbus.drive]\nhost = \"h\"\n", "rig.toml");
+  const Connection connection = read_connection(file->children("modbus").front(), 500.0);
+  EXPECT_EQ(connection.link.period_ns, 2'000'000);
+  EXPECT_EQ(connection.link.response_timeout_ns, 1'500'000);
+  EXPECT_EQ(connection.link.connection.address(), "h:502");
+}
+
+}  // namespace
+}  // namespace sinerig::modbus
