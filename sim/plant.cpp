@@ -62,9 +62,9 @@ Plant::Plant(const LinearSystem& system, double period_s, Friction friction)
       product_(n_),
       before_(rows_),
       edges_(static_cast<std::size_t>(std::ceil(dead_ticks_)) + spare_edges),
-      known_(
-          max_known_transitions,
-          {.ticks = 0.0, .phi = std::vector<double>(n_ * rows_), .gamma = std::vector<double>(rows_)}) {
+      known_(max_known_transitions, {.ticks = 0.0,
+                                     .phi = std::vector<double>(n_ * rows_),
+                                     .gamma = std::vector<double>(rows_)}) {
   // Dead times that are whole ticks but for the rounding of the division are whole ticks.
   if (std::abs(dead_ticks_ - std::round(dead_ticks_)) < 1e-9) dead_ticks_ = std::round(dead_ticks_);
   if (friction_.present() && velocity_.empty()) {

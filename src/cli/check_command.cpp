@@ -100,8 +100,8 @@ int check_command(const CheckOptions& options, const std::vector<DriverKit>& dri
   const config::Rig& rig = configured.rig();
   const StopOnInterrupt stop_on_interrupt;
   configured.open();
-  const RigCheck check =
-      check_channels(configured.clock(), configured.sensors(), rig.guard, options.seconds, stop_requested);
+  const RigCheck check = check_channels(configured.clock(), configured.sensors(), rig.guard,
+                                        options.seconds, stop_requested);
   const std::vector<Remark> remarks = configured.remarks();
 
   const bool in_virtual_time = rig.clock == config::ClockKind::virtual_time;
