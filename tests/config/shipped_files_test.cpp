@@ -54,10 +54,10 @@ TEST(ShippedFiles, HoldAtLeastTheFourThatTheManualNames) {
 
 std::vector<DriverKit> drivers() {
   // Nothing is opened here.
-  return {sim::sim_driver(), can::can_driver(), gpio::gpio_driver([] { return nullptr; })};
   return {
       sim::sim_driver(),
       can::can_driver(),
+      gpio::gpio_driver([] { return nullptr; }),
 #ifdef SINERIG_HAS_MODBUS
       modbus::modbus_driver(),
 #endif

@@ -62,7 +62,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const std::invalid_argument&) {
     return 0;
   }
-  Unwrapper unwrapper(std::abs(value));
+  sinerig::Unwrapper unwrapper(std::abs(value));
   unwrapper.apply(decode(frame.payload(), signal));
   const double applied = encode(frame.payload(), signal, value);
   const double read_back = decode(frame.payload(), signal);
