@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <csignal>
 #include <cstring>
 #include <stdexcept>
@@ -16,6 +17,9 @@ namespace sinerig::modbus {
 namespace {
 
 constexpr std::int64_t opening_ns = 500'000'000;
+
+// On a serial line five tries are spent on waiting for an answer that may come late.
+constexpr int opening_tries = 8;
 constexpr std::uint16_t most_spare = 3;
 
 // A trial waits for slow answers, to tell how slow they are, but not for a device that says
@@ -101,9 +105,14 @@ void Link::open() {
   for (std::size_t n = 0; n < places_.size(); ++n) {
     const ExchangePlan alone = ExchangePlan::make({places_[n]}, nullptr, settings_.writing, 0);
     Answer answer;
-    for (int tries = 0; tries < 3 && transport_.connected(); ++tries) {
-      answer = transport_.ask(alone.questions.front(), monotonic_now_ns() + opening_ns, registers_);
+    for (int tries = 0; tries < opening_tries && transport_.connected(); ++tries) {
+      const std::int64_t deadline_ns = monotonic_now_ns() + opening_ns;
+      answer = transport_.ask(alone.questions.front(), deadline_ns, registers_);
       if (answer.outcome == Outcome::ok || answer.outcome == Outcome::exception) break;
+      // Refused at once while the answer to the last try may still come.
+      const std::int64_t left_ns = deadline_ns - monotonic_now_ns();
+      if (settings_.connection.serial && left_ns > 0)
+        std::this_thread::sleep_for(std::chrono::nanoseconds{left_ns});
     }
     if (answer.outcome != Outcome::ok)
       throw std::runtime_error(labels_[n] + ", register " + std::to_string(places_[n].address) +

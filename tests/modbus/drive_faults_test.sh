@@ -25,7 +25,7 @@ sweep_with() {
   "$sinerig" run "$out/$transport.toml" --no-report -o "$out/run.sweep" --force >"$out/log" 2>&1
   local code=$?
   sleep 1   # a drive that has lost its power boots
-  "$sinerig" check "$out/$transport.toml" --seconds 0.2 >"$out/check" 2>&1
+  "$sinerig" check "$out/$transport.toml" --seconds 2 >"$out/check" 2>&1
   kill -TERM "$drive_pid"
   wait "$drive_pid"
   "$sinerig" show "$out/run.sweep" >"$out/shown" 2>&1
