@@ -11,7 +11,13 @@ build_packages=(
 
 # What only tests need; without them the tests concerned are skipped and say so.
 test_packages=(
-  libmatio-dev librsvg2-dev libmodbus-dev libgpiod-dev
+  fonts-dejavu-core python3-scipy python3-jsonschema python3-pymodbus python3-serial-asyncio
+)
+
+# Heavy ones, for the same: the pages in a browser, the exports in Octave, completion in other shells.
+# CI installs them; `tools/test --full` does here.
+optional_test_packages=(
+  chromium octave zsh fish groff
 )
 
 # usage TOOL : the comment at its head.
