@@ -37,7 +37,9 @@ endfunction()
 # ordinary code that lies beside it, without the wait.
 function(sinerig_in_the_loop library)
   if(SINERIG_WHOLE_PROGRAM)
-    target_compile_options(${library} PRIVATE -flto=auto -ffat-lto-objects)
+    # Nobody reads errno of the mathematics or traps on it; no result depends on it.
+    target_compile_options(${library} PRIVATE
+      -flto=auto -ffat-lto-objects -fno-math-errno -fno-trapping-math)
   endif()
 endfunction()
 function(sinerig_fast program)

@@ -86,7 +86,8 @@ void Regression::add(std::span<const Phasor> phasors,
     set_regressors(phasors, static_cast<double>(ticks_ - part_start_) * drift_scale_);
     part_gram_.add(std::span<const double>{x_.data(), order()});
   }
-  const double drift = static_cast<double>(ticks_) * drift_scale_;
+  // Signed, which is one instruction.
+  const double drift = static_cast<double>(static_cast<std::int64_t>(ticks_)) * drift_scale_;
   const std::size_t rows = order();
   for (std::size_t channel = 0; channel < channels_; ++channel) {
     const Observation& observation = observations[channel];

@@ -40,6 +40,15 @@ CoherentFrequency snap(double frequency_hz, double rate_hz, double relative_tole
   return {simplest.numerator, simplest.denominator};
 }
 
+namespace {
+
+// Processors convert signed numbers in one instruction, unsigned ones in ten.
+double to_double(std::uint64_t below_2_63) noexcept {
+  return static_cast<double>(static_cast<std::int64_t>(below_2_63));
+}
+
+}  // namespace
+
 Phasor phasor(std::uint64_t index, std::uint64_t samples) noexcept {
   // Eighths of a turn: 8·index = octant·samples + rest. By comparing, which beats a division, and
   // without a branch: which octant comes next is nothing that a processor could guess.
@@ -51,8 +60,7 @@ Phasor phasor(std::uint64_t index, std::uint64_t samples) noexcept {
     octant += in * step;
   }
   const std::uint64_t folded = (octant & 1) != 0 ? samples - rest : rest;
-  const double angle =
-      std::numbers::pi / 4.0 * (static_cast<double>(folded) / static_cast<double>(samples));
+  const double angle = std::numbers::pi / 4.0 * (to_double(folded) / to_double(samples));
   const double near_axis = std::cos(angle);
   // At 45° the two differ by a rounding; one value keeps the symmetry.
   const double off_axis = folded == samples ? near_axis : std::sin(angle);
