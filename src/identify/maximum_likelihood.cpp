@@ -131,6 +131,14 @@ Fit fit_maximum_likelihood(const Response& response, const FitOptions& options) 
   enforce_constraints(solution.data, setup.freedom, solution.refined);
   Fit fit = make_fit(setup, solution.data, solution.refined, solution.outliers);
   fit.model_error = setup.data.scatter_known ? options.model_error : 0.0;
+  const bool finite = std::ranges::all_of(response, [&](const ResponsePoint& point) {
+    return std::isfinite(std::norm(fit.zpk.at(point.omega_rad_s)));
+  });
+  if (!finite || !std::isfinite(fit.chi2))
+    throw std::invalid_argument(
+        "fit: the model of " + std::to_string(options.zeros) + " zeros and " +
+        std::to_string(options.poles) +
+        " poles is not finite at every measured frequency; lower the orders or check the units");
   return fit;
 }
 
