@@ -1,0 +1,36 @@
+# The report's page: the live page shows the same plots, with other scripts at the end.
+set(SINERIG_PAGE_SCRIPTS format scale state plot pointer plane tables histogram figures loop main)
+set(SINERIG_PAGE_STYLES theme page plot table media)
+
+# sinerig_embed_page(HEADER h NAMESPACE n TEMPLATE file [SCRIPTS file …] [STYLES file …])
+# Embeds a page in ${CMAKE_CURRENT_BINARY_DIR}/page.cpp: the template, and the report's scripts and
+# styles with those given behind them.
+function(sinerig_embed_page)
+  cmake_parse_arguments(arg "" "HEADER;NAMESPACE;TEMPLATE" "SCRIPTS;STYLES" ${ARGN})
+  set(report_page "${PROJECT_SOURCE_DIR}/src/report/page")
+  set(scripts "")
+  set(styles "")
+  foreach(name IN LISTS SINERIG_PAGE_SCRIPTS)
+    list(APPEND scripts "${report_page}/${name}.js")
+  endforeach()
+  foreach(name IN LISTS SINERIG_PAGE_STYLES)
+    list(APPEND styles "${report_page}/${name}.css")
+  endforeach()
+  list(APPEND scripts ${arg_SCRIPTS})
+  list(APPEND styles ${arg_STYLES})
+  list(JOIN scripts "+" joined_scripts)
+  list(JOIN styles "+" joined_styles)
+  set(page "${CMAKE_CURRENT_BINARY_DIR}/page.cpp")
+  set(embed "${PROJECT_SOURCE_DIR}/cmake/EmbedText.cmake")
+  # Scripts are longer than what a compiler must take in one literal; both take it.
+  set_source_files_properties("${page}" PROPERTIES COMPILE_OPTIONS -Wno-overlength-strings)
+  add_custom_command(
+    OUTPUT "${page}"
+    COMMAND ${CMAKE_COMMAND}
+      -D "OUTPUT=${page}" -D "HEADER=${arg_HEADER}" -D "NAMESPACE=${arg_NAMESPACE}"
+      -D "TEXTS=page_template:${arg_TEMPLATE},page_style:${joined_styles},page_script:${joined_scripts}"
+      -P "${embed}"
+    DEPENDS "${arg_TEMPLATE}" ${styles} ${scripts} "${embed}"
+    COMMENT "Embedding the page of ${arg_NAMESPACE}"
+    VERBATIM)
+endfunction()
