@@ -23,6 +23,7 @@ int transient(const Options& options);
 int efficiency(const Options& options);
 int bias(const Options& options);
 int bench_time(const Options& options);
+int parallel_tones(const Options& options);
 int status(const Options& options);
 int cost(const Options& options);
 

@@ -29,14 +29,13 @@ struct Part {
 };
 
 constexpr Part parts[] = {
-    {"coverage", coverage}, {"transient", transient}, {"efficiency", efficiency},
-    {"bias", bias},         {"time", bench_time},     {"status", status},
-    {"cost", cost},
+    {"coverage", coverage}, {"transient", transient},  {"efficiency", efficiency}, {"bias", bias},
+    {"time", bench_time},   {"tones", parallel_tones}, {"status", status},         {"cost", cost},
 };
 
 int usage() {
   std::fprintf(stderr,
-               "quality [coverage|transient|efficiency|bias|time|status|cost] [--seeds N] "
+               "quality [coverage|transient|efficiency|bias|time|tones|status|cost] [--seeds N] "
                "[--first-seed K] [--threads N]\nWithout a part: all of them.\n");
   return 2;
 }
