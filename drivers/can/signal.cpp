@@ -116,7 +116,7 @@ std::uint64_t extract_raw(std::span<const std::uint8_t> payload, const Signal& s
   std::uint64_t raw = 0;
   for (unsigned n = 0; n < signal.length; ++n) {
     const unsigned position = position_of(signal, n);
-    const std::uint64_t bit = (payload[position / 8U] >> (position % 8U)) & 1U;
+    const std::uint64_t bit = (std::uint64_t{payload[position / 8U]} >> (position % 8U)) & 1U;
     raw |= bit << n;
   }
   return raw;

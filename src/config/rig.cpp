@@ -158,6 +158,7 @@ SweepSettings read_sweep(const Section& section, double rate_hz) {
   sweep.block = read_span(section, "block", sweep.block, {.min = 1.0});
   sweep.target_db = section.number("target_db", {.min = 0.0, .max = 20.0}, sweep.target_db);
   sweep.target_deg = section.number("target_deg", {.min = 0.0, .max = 90.0}, sweep.target_deg);
+  sweep.target_of_first = section.choice("target_for", {"all", "first"}) == "first";
   sweep.harmonics = static_cast<std::uint32_t>(
       section.integer("harmonics", {.min = 1.0, .max = 16.0}, sweep.harmonics));
   sweep.max_distortion = section.number("max_distortion", above_zero, sweep.max_distortion);

@@ -87,8 +87,8 @@ struct Fit {
                                // standard errors are scaled by chi2/degrees_of_freedom
   int free_parameters = 0;
   double model_error = 0.0;  // the floor that was added to the scatter
-  double condition = 0.0;  // of the Jacobian with columns of size one
-  int iterations = 0;      // of the nonlinear stage, over all starts
+  double condition = 0.0;    // of the Jacobian with columns of size one
+  int iterations = 0;        // of the nonlinear stage, over all starts
   bool converged = false;
   std::string reason;                 // why it ended
   std::vector<std::size_t> outliers;  // indices of the points left out

@@ -80,6 +80,7 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
       results_(pairs_.size() * max_tones),
       estimates_(max_tones),
       strays_(max_tones),
+      transients_(pairs_.size()),
       omega_(max_bins) {}
 
 void Measurement::start(const Dwell& dwell) noexcept {
@@ -94,7 +95,6 @@ void Measurement::start(const Dwell& dwell) noexcept {
   regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
                     static_cast<double>(dwell.block_samples),
                     dwell.bias_hz > 0.0 ? 0 : dwell.parts);
-  std::fill(results_.begin(), results_.end(), Result{});
   restart();
 }
 
@@ -107,7 +107,8 @@ void Measurement::restart() noexcept {
   stride_ = 1;
   block_complete_ = true;
   block_ended_ = false;
-  settled_ = judgement_.settling == Settling::fixed;
+  std::fill(results_.begin(), results_.end(),
+            Result{.still = judgement_.settling == Settling::fixed});
   whole_blocks_ = judgement_.settling == Settling::fixed;
   done_ = false;
   regression_.begin_block();
@@ -197,25 +198,25 @@ double Measurement::settling_tolerance() const noexcept {
 // Were the window free of the transient, its late half would stray from the whole only by noise
 // (Hausman's test). Nor can the transient have left more than it began with, averaged over the
 // radians that it turned against the tone.
-bool Measurement::look_for_transient(const Window& window) noexcept {
+void Measurement::look_for_transient(std::size_t pair, const Window& window) noexcept {
   const std::size_t per_block = std::max<std::size_t>(1, dwell_->parts / stride_);
   const std::size_t blocks = (window.last - window.first) / per_block;
   // Half of the window in whole blocks, which see no harmonics; half of a short one.
   const std::size_t half = blocks >= 2 ? blocks / 2 * per_block : (window.last - window.first) / 2;
   const double most_noise = blocks < blocks_that_know_noise
-                                ? noise_growth * memories_[0].last_rms()
+                                ? noise_growth * memories_[pair].last_rms()
                                 : std::numeric_limits<double>::infinity();
   const std::size_t tones = dwell_->tones.size();
-  if (!estimator_.stray(regression_, window, window.last - half, pairs_[0], most_noise,
-                        {estimates_.data(), tones}, {strays_.data(), tones})) {
-    return false;
-  }
+  const bool known =
+      estimator_.stray(regression_, window, window.last - half, pairs_[pair], most_noise,
+                       {estimates_.data(), tones}, {strays_.data(), tones});
   const double seconds = static_cast<double>(regression_.samples_at(window.last) -
                                              regression_.samples_at(window.first)) /
                          rate_hz_;
-  bool still = true;
   for (std::size_t tone = 0; tone < tones; ++tone) {
-    Result& whole = result(0, tone);
+    Result& whole = result(pair, tone);
+    whole.still = false;
+    if (!known) continue;
     const double white = whole.estimate.white.mean_variance();
     const double dof = whole.variance.dof;
     const double seen = white > 0.0 ? whole.variance.covariance.mean_variance() / white : 1.0;
@@ -224,8 +225,8 @@ bool Measurement::look_for_transient(const Window& window) noexcept {
     whole.late.noise *= std::sqrt(colour);
     TransientBound bound;
     if (tones == 1) {
-      bound =
-          transients_.bound(whole.estimate.response, omega_[tone], std::abs(whole.estimate.input));
+      bound = transients_[pair].bound(whole.estimate.response, omega_[tone],
+                                      std::abs(whole.estimate.input));
     }
     const double shift = whole.late.shift;
     const double noise = whole.late.noise;
@@ -233,9 +234,21 @@ bool Measurement::look_for_transient(const Window& window) noexcept {
     const double shown = moves ? std::sqrt(shift * shift - noise * noise) : hidden_part * noise;
     const double turned = bound.rate_rad_s * seconds;
     whole.left = std::min(shown, turned > 2.0 ? bound.size * 2.0 / turned : bound.size);
-    still = still && !(moves && whole.left > settling_tolerance());
+    whole.still = !(moves && whole.left > settling_tolerance());
   }
-  return still;
+}
+
+// Every pair: the transient of one may be all but absent from another.
+bool Measurement::still(const Window& window) noexcept {
+  bool all = true;
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    if (pair > 0 && !evaluate(pair, window)) continue;  // a channel that is silent holds up nobody
+    look_for_transient(pair, window);
+    for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
+      all = all && result(pair, tone).still;
+    }
+  }
+  return all;
 }
 
 Interval Measurement::interval(const Result& result, double scale) const noexcept {
@@ -255,9 +268,10 @@ Interval Measurement::interval(const Result& result, double scale) const noexcep
           .phase_deg = degrees_per_radian * std::sqrt(t * t * across + left)};
 }
 
-bool Measurement::target_met() const noexcept {
+bool Measurement::target_met(std::size_t pair) const noexcept {
+  if (!judgement_.has_target() || (pair > 0 && judgement_.target_of_first)) return true;
   for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
-    const Result& each = result(0, tone);
+    const Result& each = result(pair, tone);
     if (each.variance.dof == 0.0) return false;
     const Interval half = interval(each, std::max(1.0, each.variance.expected));
     if (judgement_.target_db > 0.0 && !(half.gain_db <= judgement_.target_db)) return false;
@@ -288,14 +302,15 @@ void Measurement::judge() noexcept {
   if (static_cast<double>(length) < window_per_wait * waited) return;
   if (!evaluate(0, window)) return;
   next_look_ = samples_ + length / looks_per_length;
-  if (judgement_.settling == Settling::detect) {
-    settled_ = look_for_transient(window);
-    if (!settled_) {
-      first_ += (window.last - window.first + 3) / 4;
-      return;
-    }
+  if (judgement_.settling == Settling::detect && !still(window)) {
+    first_ += (window.last - window.first + 3) / 4;
+    return;
   }
-  if (judgement_.has_target() && !target_met()) return;
+  const bool settling_is_fixed = judgement_.settling == Settling::fixed;
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    if (pair > 0 && settling_is_fixed && !evaluate(pair, window)) continue;
+    if (!target_met(pair)) return;
+  }
   conclude();
   done_ = true;
 }
@@ -306,14 +321,12 @@ void Measurement::conclude() noexcept {
   if (window.last == window.first) return;
   for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
     if (!evaluate(pair, window)) continue;
-    if (pair == 0 && dwell_->tones.size() == 1) {
-      transients_.learn(results_[0].estimate.response, omega_[0],
-                        std::abs(results_[0].estimate.input));
+    if (dwell_->tones.size() == 1) {
+      const Estimate& single = result(pair, 0).estimate;
+      transients_[pair].learn(single.response, omega_[0], std::abs(single.input));
     }
     for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
       Result& each = result(pair, tone);
-      // A pair that settling is not judged on shares the verdict of the one that it is.
-      each.left = result(0, tone).left;
       memories_[pair].learn(each.estimate, omega_[tone] / (2.0 * std::numbers::pi));
     }
   }
@@ -366,13 +379,13 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   };
   if (point.output_amplitude == 0.0 && estimate.residual_rms == 0.0) {
     mark(PointStatus::low_signal, PointReason::stuck, 0.0);
-  } else if (!settled_) {
+  } else if (!each.still) {
     mark(PointStatus::unsettled, PointReason::still_moving, db_per_relative * each.left);
   } else if (burst) {
     mark(PointStatus::low_signal, PointReason::noise_burst, estimate.burst);
   } else if (estimate.own_distortion > judgement_.max_distortion) {
     mark(PointStatus::distorted, PointReason::harmonics, estimate.own_distortion);
-  } else if (pair == 0 && judgement_.has_target() && !target_met()) {
+  } else if (!target_met(pair)) {
     mark(PointStatus::low_signal, PointReason::target_not_reached, half.gain_db);
   } else if (!(gain > 0.0)) {
     mark(PointStatus::low_signal, PointReason::no_response, 0.0);

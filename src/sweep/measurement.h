@@ -24,7 +24,7 @@ struct Interval {
 };
 
 // A pair of regression channels (0 is what was applied, 1… the sensors) whose ratio is a response.
-// The first pair is the one that settling and targets are judged on.
+// A dwell goes on until all have settled and, unless the target is of the first only, meet it.
 using Pairs = std::vector<Pair>;
 
 class Measurement {
@@ -65,8 +65,9 @@ class Measurement {
   struct Result {
     Estimate estimate{};
     PooledVariance variance{};
-    Stray late{};       // of the late half
-    double left = 0.0;  // what the transient may have left in H, relative
+    Stray late{};        // of the late half
+    double left = 0.0;   // what the transient may have left in H, relative
+    bool still = false;  // nothing of the transient is left that the tolerance would see
     bool known = false;
   };
 
@@ -76,8 +77,9 @@ class Measurement {
   void end_part() noexcept;
   Window current_window() noexcept;
   bool evaluate(std::size_t pair, const Window& window) noexcept;
-  bool look_for_transient(const Window& window) noexcept;
-  bool target_met() const noexcept;
+  bool still(const Window& window) noexcept;
+  void look_for_transient(std::size_t pair, const Window& window) noexcept;
+  bool target_met(std::size_t pair) const noexcept;
   double settling_tolerance() const noexcept;
   Result& result(std::size_t pair, std::size_t tone) noexcept {
     return results_[pair * max_tones_ + tone];
@@ -92,12 +94,12 @@ class Measurement {
   std::size_t max_tones_;
   Regression regression_;
   WindowEstimator estimator_;
-  std::vector<NoiseMemory> memories_;  // per pair
-  std::vector<Result> results_;        // per pair and tone
-  std::vector<Estimate> estimates_;    // of the window under evaluation
-  std::vector<Stray> strays_;          // per tone
-  TransientMemory transients_;         // of the first pair
-  std::vector<double> omega_;          // per bin
+  std::vector<NoiseMemory> memories_;        // per pair
+  std::vector<Result> results_;              // per pair and tone
+  std::vector<Estimate> estimates_;          // of the window under evaluation
+  std::vector<Stray> strays_;                // per tone
+  std::vector<TransientMemory> transients_;  // per pair
+  std::vector<double> omega_;                // per bin
 
   const Dwell* dwell_ = nullptr;
   std::uint64_t samples_ = 0;  // since the start or the last disturbance
@@ -111,7 +113,6 @@ class Measurement {
   bool whole_blocks_ = false;
   bool block_complete_ = true;
   bool block_ended_ = false;
-  bool settled_ = false;
   bool done_ = false;
 };
 

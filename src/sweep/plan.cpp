@@ -300,6 +300,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   plan.judgement = {.settling = sweep.settling,
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,
+                    .target_of_first = sweep.target_of_first,
                     .max_distortion = sweep.max_distortion};
   for (const AskedGroup& group : groups_of(asked, sweep.tones)) {
     const Dwell* before = plan.dwells.empty() ? nullptr : &plan.dwells.back();

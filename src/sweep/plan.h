@@ -85,7 +85,8 @@ struct SweepSettings {
   Span block{.cycles = 1.0, .seconds = 0.02};
   double target_db = 0.05;  // half width of the 95 % interval of the gain; 0 = no target …
   double target_deg = 0.3;  // … and of the phase; without targets exactly `integrate` is measured
-  std::uint32_t harmonics = 3;  // highest harmonic of the tone that is watched
+  bool target_of_first = false;  // of several responses, only the first has to meet the targets
+  std::uint32_t harmonics = 3;   // highest harmonic of the tone that is watched
   double max_distortion = 0.1;
 
   bool has_target() const { return target_db > 0.0 || target_deg > 0.0; }
@@ -147,6 +148,7 @@ struct Judgement {
   Settling settling = Settling::detect;
   double target_db = 0.0;  // 0 = none
   double target_deg = 0.0;
+  bool target_of_first = false;  // the other responses take what its windows give
   double max_distortion = 0.1;  // more than this part of the tone in harmonics is a distorted point
 
   bool has_target() const { return target_db > 0.0 || target_deg > 0.0; }

@@ -96,8 +96,7 @@ TEST_F(LivePage, FollowsARunToItsEnd) {
   EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#guard tr').length"), 3);
   EXPECT_TRUE(
       browser_->wait_until("document.querySelector('#estimate').textContent.includes('±')"));
-  EXPECT_TRUE(
-      browser_->wait_until("document.querySelectorAll('.points tbody tr').length === 12"));
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('.points tbody tr').length === 12"));
   keep_picture("live");
   browser_->prefer_dark(true);
   keep_picture("live-dark");

@@ -212,8 +212,8 @@ TEST_F(Page, ShowsTheLoopWithItsMarginsAndTheNotch) {
   EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#loop-gain .curve').length"), 2);
   const auto cell = [&](int row, int column) {
     return browser_
-        ->evaluate("document.querySelector('#margins table tbody').rows[" +
-                   std::to_string(row) + "].cells[" + std::to_string(column) + "].textContent")
+        ->evaluate("document.querySelector('#margins table tbody').rows[" + std::to_string(row) +
+                   "].cells[" + std::to_string(column) + "].textContent")
         .get<std::string>();
   };
   // Gain margin of the model, 15.0 dB, and with the notch, more of it.

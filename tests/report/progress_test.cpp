@@ -39,7 +39,8 @@ TEST(Progress, IsALinePerPointInAPipe) {
   progress.point(third);
   progress.update(3, 4000);
   progress.close();
-  EXPECT_EQ(stream.str(), "   1/20     2.0000 Hz      6.021 dB ±0.02       -90.00° ±0.3      good\n");
+  EXPECT_EQ(stream.str(),
+            "   1/20     2.0000 Hz      6.021 dB ±0.02       -90.00° ±0.3      good\n");
 }
 
 TEST(Progress, DrawsAPictureAndTakesItAway) {

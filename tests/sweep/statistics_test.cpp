@@ -126,5 +126,37 @@ TEST(Statistics, ALightlyDampedModeIsWaitedFor) {
   }
 }
 
+TEST(Statistics, TheModeOfASecondResponseIsWaitedFor) {
+  SweepSettings sweep = ten_points();
+  sweep.spacing = Spacing::list;
+  sweep.frequencies_hz = {6.0, 7.0, 7.5, 8.0, 8.5, 9.0};
+  const std::complex<double> mode{-1.0053, 50.2554};  // 8 Hz, damping 0.02
+  const double fast = -2000.0;
+  sim::LinearSystem system;
+  system.a = Eigen::MatrixXd::Zero(3, 3);
+  system.a << fast, 0.0, 0.0, 0.0, 2.0 * mode.real(), -std::norm(mode), 0.0, 1.0, 0.0;
+  system.b = Eigen::Vector3d{-fast, std::norm(mode), 0.0};
+  system.c = Eigen::MatrixXd::Zero(2, 3);
+  system.c << 1.0, 0.0, 0.0, 0.0, 0.0, 1.0;
+  system.d = Eigen::Vector2d::Zero();
+  system.outputs = {"fast", "flexible"};
+  auto rig = rig_of(1);
+  rig.system = system;
+  rig.sensors.resize(2);
+  rig.sensors[1].output = 1;
+  for (auto& sensor : rig.sensors) sensor.imperfections.noise_rms = 1e-3;
+  const auto modes = test::partial_fractions({}, {Complex{mode}, Complex{std::conj(mode)}},
+                                             static_cast<long double>(std::norm(mode)));
+  const auto run = test::run_virtual(plan_sweep(sweep, {}, rate_hz), rig);
+  ASSERT_EQ(run.sink.points.size(), 12U);
+  for (const Point& point : run.sink.points) {
+    EXPECT_EQ(point.status, PointStatus::good) << point.frequency_hz;
+    if (point.pair == 0) continue;
+    const std::complex<double> exact{test::held_response(
+        modes, two_pi * static_cast<long double>(point.frequency_hz), 1.0L / rate_hz)};
+    EXPECT_LT(std::abs(point.response / exact - 1.0), 0.012) << point.frequency_hz;
+  }
+}
+
 }  // namespace
 }  // namespace sinerig
