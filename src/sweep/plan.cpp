@@ -276,6 +276,19 @@ std::uint64_t SweepPlan::max_samples() const {
   return sum;
 }
 
+std::size_t SweepPlan::most_tones() const {
+  std::size_t most = 1;
+  for (const Dwell& dwell : dwells) most = std::max(most, dwell.tones.size());
+  return most;
+}
+
+std::size_t SweepPlan::most_bins() const {
+  std::size_t most = 1;
+  for (const Dwell& dwell : dwells) most = std::max(most, dwell.bins());
+  for (const Dwell& dwell : refinement.candidates) most = std::max(most, dwell.bins());
+  return most;
+}
+
 double amplitude_at(const SweepSettings& sweep, double frequency_hz) {
   const double omega_rad_s = two_pi * frequency_hz;
   const double wanted = sweep.amplitude_table.empty()

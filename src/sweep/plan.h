@@ -174,6 +174,10 @@ struct SweepPlan {
   std::uint64_t max_samples() const;
   double min_seconds() const { return static_cast<double>(min_samples()) / rate_hz; }
   double max_seconds() const { return static_cast<double>(max_samples()) / rate_hz; }
+
+  // Of any dwell, those that refinement may add included.
+  std::size_t most_tones() const;
+  std::size_t most_bins() const;
 };
 
 // A plan that can't be run: the message says what, `section` and `key` say which entry of the rig

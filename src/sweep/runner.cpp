@@ -1,37 +1,14 @@
 #include "sweep/runner.h"
 
-#include <algorithm>
-#include <bit>
 #include <cmath>
-#include <complex>
-#include <numbers>
 #include <utility>
 
 namespace sinerig {
 
 namespace {
 
-// A dwell that gaps keep from finishing is given up at this many times its planned length.
-constexpr std::uint64_t max_dwell_stretch = 4;
-
 // A slow loop that misses a few ticks has not lost its clock, however long that takes.
 constexpr std::uint64_t min_lost_ticks = 10;
-
-// The transient of a dwell's beginning is not to be taken for a wrong sign of a read-back.
-constexpr std::uint32_t blocks_before_check = 2;
-
-std::size_t most_tones(const SweepPlan& plan) {
-  std::size_t most = 1;
-  for (const Dwell& dwell : plan.dwells) most = std::max(most, dwell.tones.size());
-  return most;
-}
-
-std::size_t most_bins(const SweepPlan& plan) {
-  std::size_t most = 1;
-  for (const Dwell& dwell : plan.dwells) most = std::max(most, dwell.bins());
-  for (const Dwell& dwell : plan.refinement.candidates) most = std::max(most, dwell.bins());
-  return most;
-}
 
 // With room for those that refinement adds.
 std::vector<const Dwell*> dwells_of(const SweepPlan& plan) {
@@ -48,11 +25,11 @@ std::size_t most_points(const SweepPlan& plan) {
   return points;
 }
 
-Pairs responses_of(const RunnerSettings& settings, std::size_t sensors) {
-  if (!settings.responses.empty()) return settings.responses;
-  Pairs pairs;
-  for (std::size_t i = 0; i < sensors; ++i) pairs.push_back({.input = 0, .output = 1 + i});
-  return pairs;
+RunnerSettings with_responses(RunnerSettings settings, std::size_t sensors) {
+  if (!settings.responses.empty()) return settings;
+  for (std::size_t i = 0; i < sensors; ++i)
+    settings.responses.push_back({.input = 0, .output = 1 + i});
+  return settings;
 }
 
 class ReleaseOnExit {
@@ -71,23 +48,19 @@ class ReleaseOnExit {
 SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, Actuator& actuator,
                          std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink)
     : plan_{std::move(plan)},
-      settings_{std::move(settings)},
+      settings_{with_responses(std::move(settings), sensors.size())},
       clock_{clock},
       actuator_{actuator},
       sensors_{sensors.begin(), sensors.end()},
       guard_{guard},
       sink_{sink},
       dwells_{dwells_of(plan_)},
-      refiner_{plan_.refinement, plan_.rate_hz, most_points(plan_),
-               responses_of(settings_, sensors.size()).size()},
-      excitation_{most_tones(plan_), most_bins(plan_), plan_.baseline},
+      refiner_{plan_.refinement, plan_.rate_hz, most_points(plan_), settings_.responses.size()},
+      excitation_{plan_.most_tones(), plan_.most_bins(), plan_.baseline},
       leveller_{plan_.level},
-      measurement_{1 + sensors.size(), most_bins(plan_),
-                   most_tones(plan_),  responses_of(settings_, sensors.size()),
-                   plan_.judgement,    plan_.rate_hz},
+      run_{plan_, settings_, sensors.size(), excitation_, guard_, sink_},
       observations_(1 + sensors.size()),
-      sensor_faults_(sensors.size(), Fault::none),
-      range_faults_(sensors.size()) {}
+      sensor_faults_(sensors.size(), Fault::none) {}
 
 RunOutcome SweepRunner::run(RunControl& control) noexcept {
   {
@@ -114,11 +87,12 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const std::uint64_t ticks = first ? 1 : tick.index - last_tick_;
 
   const bool closing = dwell_ == dwells_.size();
-  const bool new_dwell = !closing && dwell_ticks_ == 0;
+  const bool new_dwell = !closing && !run_.begun();
   if (new_dwell) begin_dwell(first ? 0 : last_tick_ + 1);
   excitation_.advance(new_dwell ? ticks - 1 : ticks);
-  dwell_ticks_ += ticks;
-  account(tick, ticks);
+  run_.pass(tick, ticks);
+  ++outcome_.ticks;
+  last_tick_ = tick.index;
 
   const int stop_requests = control.stop_requests.load(std::memory_order_relaxed);
   if (stop_requests > 0) {
@@ -136,7 +110,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
     if (!closing) {
-      measurement_.conclude();
+      run_.conclude();
       finish_dwell();
     }
     return false;
@@ -144,7 +118,8 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
-  measure(tick.index, ticks > 1 || late || command_lost_ || command_late_);
+  run_.measure(tick.index, observations_, ticks > 1 || late || command_lost_ || command_late_);
+  if (run_.over()) next_dwell();
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
   if (dwell_ < dwells_.size()) return true;
   excitation_.close();
@@ -200,7 +175,7 @@ bool SweepRunner::applied_late(std::int64_t offset_ns) noexcept {
 
 void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
                               std::uint64_t tick) noexcept {
-  if (sample.fault == Fault::range) ++range_faults_[sensor];
+  if (sample.fault == Fault::range) run_.note_range_fault(sensor);
   const bool was_good = sensor_faults_[sensor] == Fault::none;
   const bool is_good = sample.fault == Fault::none;
   if (was_good != is_good) {
@@ -213,26 +188,18 @@ void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
   sensor_faults_[sensor] = sample.fault;
 }
 
-// A late or lost command has disturbed the plant: what was gathered is void, wait again. A lost
-// sensor sample has not: it leaves the regression.
-void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
+void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
   const Dwell& dwell = *dwells_[dwell_];
-  if (disturbed) {
-    ++timing_.resettles;
-    settle_left_ = std::max(settle_left_, dwell.settle_samples);
-    measurement_.disturb();
-  } else if (settle_left_ > 0) {
-    --settle_left_;
-  } else {
-    measurement_.add(excitation_.phasors(), observations_);
-    if (measurement_.block_ended()) {
-      put_block(tick);
-      if (blocks_ <= blocks_before_check) check_excitation(tick);
-    }
+  if (attempt_ == 0) {
+    scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
   }
-  given_up_ = dwell_ticks_ >= max_dwell_stretch * dwell.max_samples;
-  if (!measurement_.done() && !given_up_) return;
-  measurement_.conclude();
+  excitation_.start(dwell, scale_);
+  run_.begin(dwell, dwell_, attempt_, scale_, tick);
+  announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
+}
+
+void SweepRunner::next_dwell() noexcept {
+  run_.conclude();
   if (try_again()) return;
   finish_dwell();
   attempt_ = 0;
@@ -257,88 +224,23 @@ void SweepRunner::refine() noexcept {
 
 bool SweepRunner::try_again() noexcept {
   const double planned = dwells_[dwell_]->tones.front().amplitude;
-  const std::optional<double> scale = leveller_.retry(make_point(0, 0), scale_, planned);
+  const std::optional<double> scale = leveller_.retry(run_.point(0, 0), scale_, planned);
   if (!scale) return false;
   announce(
       {.kind = EventKind::retried, .dwell = dwell_, .tick = last_tick_, .value = *scale * planned});
   scale_ = *scale;
   ++attempt_;
-  outcome_.skipped_ticks += timing_.skipped;
-  dwell_ticks_ = 0;
+  outcome_.skipped_ticks += run_.timing().skipped;
+  run_.end();
   return true;
-}
-
-void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
-  const Dwell& dwell = *dwells_[dwell_];
-  if (attempt_ == 0) {
-    scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
-  }
-  excitation_.start(dwell, scale_);
-  measurement_.start(dwell);
-  settle_left_ = dwell.settle_samples;
-  blocks_ = 0;
-  given_up_ = false;
-  timing_ = {.dwell = dwell_, .first_tick = tick};
-  std::fill(range_faults_.begin(), range_faults_.end(), 0);
-  announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
-}
-
-void SweepRunner::put_block(std::uint64_t tick) noexcept {
-  const Dwell& dwell = *dwells_[dwell_];
-  for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
-    for (std::size_t channel = 0; channel < observations_.size(); ++channel) {
-      sink_.put(Block{.dwell = dwell_,
-                      .attempt = attempt_,
-                      .block = blocks_,
-                      .tone = static_cast<std::uint16_t>(tone),
-                      .channel = static_cast<std::uint16_t>(applied_channel + channel),
-                      .first_tick = tick + 1 - dwell.block_samples,
-                      .coefficients = measurement_.block_coefficients(channel, tone)});
-    }
-  }
-  ++blocks_;
-}
-
-void SweepRunner::check_excitation(std::uint64_t tick) noexcept {
-  constexpr TripCause causes[] = {TripCause::none, TripCause::excitation_missing,
-                                  TripCause::excitation_other_frequency,
-                                  TripCause::excitation_reversed};
-  const auto refuse = [&](const ExcitationVerdict& verdict, std::uint32_t sensor) {
-    if (verdict.fault == ExcitationFault::none) return;
-    guard_.trip(causes[static_cast<std::size_t>(verdict.fault)], sensor, verdict.value,
-                verdict.limit, tick);
-  };
-  const Dwell& dwell = *dwells_[dwell_];
-  const std::size_t tones = dwell.tones.size();
-  for (std::size_t tone = 0; tone < tones; ++tone) {
-    // What a bus reports a tick later was applied at the time that it says.
-    const double angle_rad = 2.0e-9 * std::numbers::pi *
-                             dwell.tone_hz(dwell.tones[tone], plan_.rate_hz) *
-                             static_cast<double>(applied_offset_ns_);
-    refuse(check_applied(
-               measurement_.block_coefficients(0, tone).phasor() * std::polar(1.0, -angle_rad),
-               excitation_.commanded(tone), settings_.min_excitation),
-           no_sensor);
-  }
-  if (blocks_ < blocks_before_check) return;
-  for (const std::size_t sensor : settings_.readbacks) {
-    double tone_power = 0.0;
-    for (std::size_t tone = 0; tone < tones; ++tone) {
-      tone_power += 0.5 * std::norm(measurement_.block_coefficients(1 + sensor, tone).phasor());
-    }
-    refuse(
-        check_readback(measurement_.block_coefficients(1 + sensor, 0).phasor(),
-                       excitation_.commanded(0), tone_power, measurement_.block_power(1 + sensor)),
-        static_cast<std::uint32_t>(sensor));
-  }
 }
 
 void SweepRunner::finish_dwell() noexcept {
   const Dwell& dwell = *dwells_[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
     const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
-    for (std::size_t pair = 0; pair < measurement_.pairs().size(); ++pair) {
-      const Point point = make_point(pair, tone);
+    for (std::size_t pair = 0; pair < run_.responses(); ++pair) {
+      const Point point = run_.point(pair, tone);
       sink_.put(point);
       if (refining && point.status == PointStatus::good) {
         refiner_.set(pair, point.response, point.covariance.mean_variance());
@@ -346,59 +248,9 @@ void SweepRunner::finish_dwell() noexcept {
     }
     if (refining) refiner_.learn();
   }
-  sink_.put(timing_);
-  outcome_.skipped_ticks += timing_.skipped;
-  dwell_ticks_ = 0;
-}
-
-Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept {
-  const Dwell& dwell = *dwells_[dwell_];
-  Point point = measurement_.point(pair, tone);
-  point.dwell = dwell_;
-  point.seconds = static_cast<double>(dwell_ticks_) / plan_.rate_hz;
-  // Only what was applied is in the unit of the command.
-  const double excitation = point.input == applied_channel
-                                ? point.input_amplitude / (scale_ * dwell.tones[tone].amplitude)
-                                : 1.0;
-  const auto sensor = static_cast<std::size_t>(point.output - first_sensor_channel);
-  const auto mark = [&](PointStatus status, PointReason reason, double value) {
-    point.status = status;
-    point.reason = reason;
-    point.reason_value = value;
-  };
-  if (guard_.trip().tripped()) {
-    mark(PointStatus::stopped, PointReason::guard_trip, 0.0);
-  } else if (given_up_ && timing_.resettles > 0) {
-    mark(PointStatus::rt_fault, PointReason::gaps, timing_.resettles);
-  } else if (!(excitation >= settings_.min_excitation)) {
-    mark(PointStatus::low_signal, PointReason::no_excitation, excitation);
-  } else if (range_faults_[sensor] > 0) {
-    const auto ticks = static_cast<double>(timing_.ticks);
-    mark(PointStatus::clipped, PointReason::output_at_range,
-         static_cast<double>(range_faults_[sensor]) / ticks);
-  } else if (given_up_) {
-    mark(PointStatus::rt_fault, PointReason::gaps, point.lost);
-  }
-  return point;
-}
-
-void SweepRunner::account(const Tick& tick, std::uint64_t ticks) noexcept {
-  const std::int64_t lateness_ns = tick.lateness.count();
-  const auto microseconds =
-      static_cast<std::uint64_t>(std::max<std::int64_t>(lateness_ns, 0)) / 1000;
-  const auto bin = static_cast<std::size_t>(std::bit_width(microseconds));
-  ++timing_.lateness[std::min(bin, DwellTiming::bins - 1)];
-  timing_.max_lateness_ns = std::max(timing_.max_lateness_ns, lateness_ns);
-  ++timing_.ticks;
-  ++outcome_.ticks;
-  if (ticks > 1) {
-    timing_.skipped += ticks - 1;
-    announce({.kind = EventKind::gap,
-              .dwell = dwell_,
-              .tick = tick.index,
-              .value = static_cast<double>(ticks - 1)});
-  }
-  last_tick_ = tick.index;
+  sink_.put(run_.timing());
+  outcome_.skipped_ticks += run_.timing().skipped;
+  run_.end();
 }
 
 }  // namespace sinerig

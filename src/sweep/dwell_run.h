@@ -1,0 +1,75 @@
+// One dwell under way, from its first tick to its points: what is waited for, what a disturbance
+// makes void, whether the excitation is there, what the points say of themselves.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "sweep/clock.h"
+#include "sweep/excitation.h"
+#include "sweep/guard.h"
+#include "sweep/measurement.h"
+#include "sweep/plan.h"
+#include "sweep/records.h"
+#include "sweep/runner_settings.h"
+
+namespace sinerig {
+
+class DwellRun {
+ public:
+  // Takes all memory for every dwell of the plan. What is referred to must outlive it.
+  DwellRun(const SweepPlan& plan, const RunnerSettings& settings, std::size_t sensors,
+           const Excitation& excitation, Guard& guard, RecordSink& sink);
+
+  // `index` in running order, `attempt` at it, `scale` of its planned amplitudes, `tick` its first.
+  void begin(const Dwell& dwell, std::uint32_t index, std::uint32_t attempt, double scale,
+             std::uint64_t tick) noexcept SINERIG_NONBLOCKING;
+  bool begun() const noexcept { return ticks_ > 0; }
+
+  // `ticks` of the grid have passed since the last call, this one included.
+  void pass(const Tick& tick, std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
+  void note_range_fault(std::size_t sensor) noexcept { ++range_faults_[sensor]; }
+
+  // What was applied and read at this tick, the applied signal first; `disturbed`: the command was
+  // late or lost.
+  void measure(std::uint64_t tick, std::span<const Observation> observations,
+               bool disturbed) noexcept SINERIG_NONBLOCKING;
+
+  // Measured as far as it will be.
+  bool over() const noexcept { return measurement_.done() || given_up_; }
+
+  // Takes the judgement as it stands, for the end or a stop in the midst of it.
+  void conclude() noexcept SINERIG_NONBLOCKING { measurement_.conclude(); }
+  Point point(std::size_t pair, std::size_t tone) const noexcept SINERIG_NONBLOCKING;
+  const DwellTiming& timing() const noexcept { return timing_; }
+
+  // The next begins.
+  void end() noexcept { ticks_ = 0; }
+
+  std::size_t responses() const noexcept { return measurement_.pairs().size(); }
+
+ private:
+  void put_block(std::uint64_t tick, std::size_t channels) noexcept;
+  void check_excitation(std::uint64_t tick, std::int64_t applied_offset_ns) noexcept;
+
+  double rate_hz_;
+  const RunnerSettings& settings_;
+  const Excitation& excitation_;
+  Guard& guard_;
+  RecordSink& sink_;
+  Measurement measurement_;
+  std::vector<std::uint64_t> range_faults_;  // per sensor
+
+  const Dwell* dwell_ = nullptr;
+  std::uint32_t index_ = 0;
+  std::uint32_t attempt_ = 0;
+  double scale_ = 1.0;
+  std::uint32_t blocks_ = 0;
+  std::uint64_t ticks_ = 0;  // of the grid since the dwell began; 0: it has to begin
+  std::uint64_t settle_left_ = 0;
+  bool given_up_ = false;
+  DwellTiming timing_;
+};
+
+}  // namespace sinerig

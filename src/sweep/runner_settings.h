@@ -1,0 +1,20 @@
+// What a run is told beside its plan.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "sweep/measurement.h"
+
+namespace sinerig {
+
+struct RunnerSettings {
+  Pairs responses{};                     // empty: every sensor over what was applied
+  std::vector<std::size_t> readbacks{};  // sensors that read the excitation back
+  bool record_samples = false;
+  double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
+  double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
+  double max_gap_s = 1.0;        // without a tick: the machine slept, nobody minded the actuator
+};
+
+}  // namespace sinerig
