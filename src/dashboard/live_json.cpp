@@ -15,9 +15,29 @@ namespace sinerig::dashboard {
 
 namespace {
 
+Json event_row(std::uint64_t tick, std::uint32_t dwell, EventKind kind, const std::string& channel,
+               const std::string& words) {
+  return {{"tick", tick},
+          {"dwell", dwell},
+          {"kind", to_string(kind)},
+          {"channel", channel},
+          {"text", words}};
+}
+
+Json event_json(const Note& note) {
+  return event_row(note.tick, note.dwell, note.kind, "", note.text.data());
+}
+
+Json event_json(const Preflight& preflight, const record::StoredRun& run) {
+  std::vector<std::string> names;
+  for (const record::ChannelInfo& channel : run.channels) names.push_back(channel.name);
+  return event_row(preflight.tick, preflight.dwell, EventKind::preflight,
+                   names.at(preflight.output), describe(preflight, names));
+}
+
 Json event_json(const Event& event, const record::StoredRun& run) {
   std::string words;
-  if (event.kind == EventKind::tripped) {
+  if (event.trip.tripped()) {
     std::vector<std::string> sensors;
     for (std::size_t i = first_sensor_channel; i < run.channels.size(); ++i)
       sensors.push_back(run.channels[i].name);
@@ -28,11 +48,8 @@ Json event_json(const Event& event, const record::StoredRun& run) {
     words = rounded(event.value, 6).dump();
   }
   const bool of_channel = event.channel > 0 && event.channel < run.channels.size();
-  return {{"tick", event.tick},
-          {"dwell", event.dwell},
-          {"kind", to_string(event.kind)},
-          {"channel", of_channel ? run.channels[event.channel].name : ""},
-          {"text", words}};
+  return event_row(event.tick, event.dwell, event.kind,
+                   of_channel ? run.channels[event.channel].name : "", words);
 }
 
 }  // namespace
@@ -94,6 +111,10 @@ Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) 
         histogram[bin] += timing->lateness[bin];
     } else if (const auto* event = std::get_if<Event>(&entry)) {
       events.push_back(event_json(*event, run));
+    } else if (const auto* preflight = std::get_if<Preflight>(&entry)) {
+      events.push_back(event_json(*preflight, run));
+    } else if (const auto* note = std::get_if<Note>(&entry)) {
+      events.push_back(event_json(*note));
     }
   }
   Json responses = Json::array();

@@ -99,7 +99,7 @@ void LiveRun::take(const Record& record) {
       level_ = event->value;
       ++retries_;
     }
-    if (events_ < most_events || event->kind == EventKind::tripped) {
+    if (events_ < most_events || event->trip.tripped()) {
       entries_.push_back(record);
       ++events_;
     }

@@ -99,6 +99,7 @@ SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists 
   Statement channel{database_, "INSERT INTO channel VALUES (?, ?, ?)"};
   for (std::size_t i = 0; i < info.channels.size(); ++i) {
     channel.bind(i, info.channels[i].name, info.channels[i].unit).run();
+    channel_names_.push_back(info.channels[i].name);
     if (i >= first_sensor_channel) sensor_names_.push_back(info.channels[i].name);
   }
   for (std::size_t i = 0; i < info.plan.dwells.size(); ++i) write_dwell(i, info.plan.dwells[i]);
@@ -182,11 +183,24 @@ void SweepWriter::insert(const DwellTiming& timing) {
 
 void SweepWriter::insert(const Event& event) {
   if (event.kind == EventKind::refined) write_dwell(event.dwell, candidates_.at(event.candidate));
-  const std::string detail =
-      event.kind == EventKind::tripped ? describe(event.trip, sensor_names_) : "";
+  const std::string detail = event.trip.tripped() ? describe(event.trip, sensor_names_) : "";
   statements_->event
       .bind(event.tick, event.dwell, to_string(event.kind), event.channel, to_string(event.fault),
             event.value, detail)
+      .run();
+}
+
+void SweepWriter::insert(const Preflight& preflight) {
+  statements_->event
+      .bind(preflight.tick, preflight.dwell, to_string(EventKind::preflight), preflight.output,
+            to_string(Fault::none), preflight.gain, describe(preflight, channel_names_))
+      .run();
+}
+
+void SweepWriter::insert(const Note& note) {
+  statements_->event
+      .bind(note.tick, note.dwell, to_string(note.kind), std::uint32_t{0}, to_string(Fault::none),
+            0.0, std::string{note.text.data()})
       .run();
 }
 

@@ -60,9 +60,12 @@ class SweepWriter {
   void insert(const Block& block);
   void insert(const DwellTiming& timing);
   void insert(const Event& event);
+  void insert(const Preflight& preflight);
+  void insert(const Note& note);
   void insert(const TickSamples& samples);
 
   std::string path_;
+  std::vector<std::string> channel_names_;
   std::vector<std::string> sensor_names_;
   std::vector<Dwell> candidates_;  // of the plan's refinement
   Database database_;

@@ -148,7 +148,9 @@ Point DwellRun::point(std::size_t pair, std::size_t tone) const noexcept {
     point.reason_value = value;
   };
   if (guard_.trip().tripped()) {
-    mark(PointStatus::stopped, PointReason::guard_trip, 0.0);
+    const bool soft = guard_.trip().soft;
+    mark(PointStatus::stopped, soft ? PointReason::soft_limit : PointReason::guard_trip,
+         soft ? scale_ : 0.0);
   } else if (given_up_ && timing_.resettles > 0) {
     mark(PointStatus::rt_fault, PointReason::gaps, timing_.resettles);
   } else if (!(excitation >= settings_.min_excitation)) {

@@ -48,6 +48,12 @@ void Excitation::start(const Dwell& dwell, double scale) noexcept {
   if (several) handover_ = last - tones();
 }
 
+void Excitation::rest() noexcept {
+  tones_ = 0;
+  loudness_ = 0.0;
+  run_ticks_ = 0;
+}
+
 void Excitation::advance(std::uint64_t ticks) noexcept {
   elapsed_ += ticks;
   run_ticks_ += ticks;

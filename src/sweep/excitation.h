@@ -25,6 +25,9 @@ class Excitation {
   // either.
   void start(const Dwell& dwell, double scale) noexcept SINERIG_NONBLOCKING;
 
+  // The command has been taken to neutral: the next dwell begins from there.
+  void rest() noexcept SINERIG_NONBLOCKING;
+
   // Moves on by `ticks`.
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
 

@@ -65,9 +65,13 @@ std::optional<double> Leveller::retry(const Point& point, double scale,
     ++tries_;
     return next;
   }
+  accept(point);
+  return std::nullopt;
+}
+
+void Leveller::accept(const Point& point) noexcept {
   tries_ = 0;
   learn(point);
-  return std::nullopt;
 }
 
 }  // namespace sinerig

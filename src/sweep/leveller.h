@@ -24,6 +24,9 @@ class Leveller {
   std::optional<double> retry(const Point& point, double scale,
                               double planned_amplitude) noexcept SINERIG_NONBLOCKING;
 
+  // The point stands, whatever its level.
+  void accept(const Point& point) noexcept SINERIG_NONBLOCKING;
+
  private:
   struct Gain {
     double log_frequency = 0.0;

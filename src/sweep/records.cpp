@@ -28,6 +28,7 @@ const char* to_string(PointReason reason) noexcept {
     case PointReason::output_at_range: return "output_at_range";
     case PointReason::gaps: return "gaps";
     case PointReason::guard_trip: return "guard_trip";
+    case PointReason::soft_limit: return "soft_limit";
   }
   return "unknown";
 }
@@ -42,7 +43,13 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::actuator_fault: return "actuator_fault";
     case EventKind::sensor_fault: return "sensor_fault";
     case EventKind::sensor_recovered: return "sensor_recovered";
+    case EventKind::limited: return "limited";
     case EventKind::tripped: return "tripped";
+    case EventKind::device_fault: return "device_fault";
+    case EventKind::rearming: return "rearming";
+    case EventKind::rearm_failed: return "rearm_failed";
+    case EventKind::rearmed: return "rearmed";
+    case EventKind::preflight: return "preflight";
     case EventKind::released: return "released";
     case EventKind::finished: return "finished";
   }

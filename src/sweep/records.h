@@ -10,6 +10,7 @@
 #include "drivers/driver.h"
 #include "sweep/estimator.h"
 #include "sweep/guard.h"
+#include "sweep/preflight.h"
 #include "sweep/regression.h"
 
 namespace sinerig {
@@ -45,6 +46,7 @@ enum class PointReason : std::uint8_t {
   harmonics,           // of the output, relative to the tone
   noise_burst,         // power of the loudest cluster over that of the others
   guard_trip,          // see the event of the same tick
+  soft_limit,          // at the lowest amplitude that was tried, this part of the planned one
 };
 
 const char* to_string(PointReason reason) noexcept;
@@ -109,7 +111,13 @@ enum class EventKind : std::uint8_t {
   actuator_fault,  // detail: Fault
   sensor_fault,    // channel, detail: Fault; the first of a run of them
   sensor_recovered,
-  tripped,  // see trip
+  limited,       // a soft limit ended the dwell; see trip
+  tripped,       // see trip
+  device_fault,  // what a device says of its fault, in the note
+  rearming,      // value: seconds until the devices are armed again
+  rearm_failed,  // the note says why
+  rearmed,
+  preflight,  // see Preflight
   released,
   finished,
 };
@@ -127,6 +135,14 @@ struct Event {
   Trip trip{};
 };
 
+// An event in words that only a device has.
+struct Note {
+  EventKind kind = EventKind::started;
+  std::uint32_t dwell = 0;
+  std::uint64_t tick = 0;
+  std::array<char, 160> text{};  // ends with a 0
+};
+
 // One tick of every channel; only when the rig file asks for samples.
 struct TickSamples {
   std::uint64_t tick = 0;
@@ -135,7 +151,7 @@ struct TickSamples {
   std::array<double, max_channels> values{};
 };
 
-using Record = std::variant<Point, Block, DwellTiming, Event, TickSamples>;
+using Record = std::variant<Point, Block, DwellTiming, Event, Preflight, Note, TickSamples>;
 static_assert(std::is_trivially_copyable_v<Record>);
 
 // Where the loop hands its records. Called from the loop's thread; may not wait or allocate.

@@ -46,7 +46,8 @@ class ReleaseOnExit {
 }  // namespace
 
 SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, Actuator& actuator,
-                         std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink)
+                         std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink,
+                         Rearm* rearm)
     : plan_{std::move(plan)},
       settings_{with_responses(std::move(settings), sensors.size())},
       clock_{clock},
@@ -58,23 +59,28 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       refiner_{plan_.refinement, plan_.rate_hz, most_points(plan_), settings_.responses.size()},
       excitation_{plan_.most_tones(), plan_.most_bins(), plan_.baseline},
       leveller_{plan_.level},
+      recovery_{settings_.retry, clock_, sink_, rearm},
       run_{plan_, settings_, sensors.size(), excitation_, guard_, sink_},
       observations_(1 + sensors.size()),
-      sensor_faults_(sensors.size(), Fault::none) {}
+      sensor_faults_(sensors.size(), Fault::none),
+      preflight_{settings_.preflight.wanted} {}
 
 RunOutcome SweepRunner::run(RunControl& control) noexcept {
-  {
+  announce({.kind = EventKind::started});
+  do {
     const ReleaseOnExit release{actuator_};
-    announce({.kind = EventKind::started});
     while (step(control)) {
     }
-  }
+  } while (recover(control));
   outcome_.trip = guard_.trip();
+  outcome_.faults = recovery_.faults();
+  outcome_.soft_trips = recovery_.soft_trips();
   if (outcome_.trip.tripped()) {
-    announce({.kind = EventKind::tripped,
-              .dwell = dwell_,
-              .tick = outcome_.trip.tick,
-              .trip = outcome_.trip});
+    if (under_way()) {
+      run_.conclude();
+      finish_dwell();
+    }
+    tell_trip(EventKind::tripped);
   }
   announce({.kind = EventKind::released, .dwell = dwell_, .tick = last_tick_});
   announce({.kind = EventKind::finished, .dwell = dwell_, .tick = last_tick_});
@@ -83,12 +89,11 @@ RunOutcome SweepRunner::run(RunControl& control) noexcept {
 
 bool SweepRunner::step(RunControl& control) noexcept {
   const Tick tick = clock_.wait();
-  const bool first = outcome_.ticks == 0;
-  const std::uint64_t ticks = first ? 1 : tick.index - last_tick_;
+  const std::uint64_t ticks = std::exchange(from_rest_, false) ? 1 : tick.index - last_tick_;
 
   const bool closing = dwell_ == dwells_.size();
   const bool new_dwell = !closing && !run_.begun();
-  if (new_dwell) begin_dwell(first ? 0 : last_tick_ + 1);
+  if (new_dwell) begin_dwell(tick.index + 1 - ticks);
   excitation_.advance(new_dwell ? ticks - 1 : ticks);
   run_.pass(tick, ticks);
   ++outcome_.ticks;
@@ -102,6 +107,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (gap_s > settings_.max_gap_s && ticks > min_lost_ticks) {
     guard_.trip(TripCause::clock_lost, no_sensor, gap_s, settings_.max_gap_s, tick.index);
   }
+  guard_.observe_lateness(tick.lateness.count(), tick.index);
   command_ = guard_.admit(excitation_.command(), tick.index, ticks);
   exchange(command_, tick);
   control.tick.store(tick.index, std::memory_order_relaxed);
@@ -109,18 +115,19 @@ bool SweepRunner::step(RunControl& control) noexcept {
 
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
-    if (!closing) {
-      run_.conclude();
-      finish_dwell();
-    }
-    return false;
+    return guard_.trip().soft && !closing && pause(ticks);
   }
   if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
   run_.measure(tick.index, observations_, ticks > 1 || late || command_lost_ || command_late_);
-  if (run_.over()) next_dwell();
+  if (run_.over()) conclude_dwell();
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
+  return go_on();
+}
+
+// False at the end of the plan, where nothing is left to be taken back to neutral.
+bool SweepRunner::go_on() noexcept {
   if (dwell_ < dwells_.size()) return true;
   excitation_.close();
   return !excitation_.closed();
@@ -186,71 +193,6 @@ void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
               .tick = tick});
   }
   sensor_faults_[sensor] = sample.fault;
-}
-
-void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
-  const Dwell& dwell = *dwells_[dwell_];
-  if (attempt_ == 0) {
-    scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
-  }
-  excitation_.start(dwell, scale_);
-  run_.begin(dwell, dwell_, attempt_, scale_, tick);
-  announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
-}
-
-void SweepRunner::next_dwell() noexcept {
-  run_.conclude();
-  if (try_again()) return;
-  finish_dwell();
-  attempt_ = 0;
-  ++dwell_;
-  ++outcome_.dwells_done;
-  if (dwell_ == dwells_.size()) refine();
-}
-
-// One more dwell where the response between two points is not known.
-void SweepRunner::refine() noexcept {
-  if (dwells_.size() == plan_.dwells.size() + plan_.refinement.most_points) return;
-  const double disagreement_db = refiner_.worst_db();
-  const std::optional<std::size_t> candidate = refiner_.next();
-  if (!candidate) return;
-  dwells_.push_back(&plan_.refinement.candidates[*candidate]);  // within what was reserved
-  announce({.kind = EventKind::refined,
-            .dwell = dwell_,
-            .tick = last_tick_,
-            .value = disagreement_db,
-            .candidate = static_cast<std::uint32_t>(*candidate)});
-}
-
-bool SweepRunner::try_again() noexcept {
-  const double planned = dwells_[dwell_]->tones.front().amplitude;
-  const std::optional<double> scale = leveller_.retry(run_.point(0, 0), scale_, planned);
-  if (!scale) return false;
-  announce(
-      {.kind = EventKind::retried, .dwell = dwell_, .tick = last_tick_, .value = *scale * planned});
-  scale_ = *scale;
-  ++attempt_;
-  outcome_.skipped_ticks += run_.timing().skipped;
-  run_.end();
-  return true;
-}
-
-void SweepRunner::finish_dwell() noexcept {
-  const Dwell& dwell = *dwells_[dwell_];
-  for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
-    const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
-    for (std::size_t pair = 0; pair < run_.responses(); ++pair) {
-      const Point point = run_.point(pair, tone);
-      sink_.put(point);
-      if (refining && point.status == PointStatus::good) {
-        refiner_.set(pair, point.response, point.covariance.mean_variance());
-      }
-    }
-    if (refining) refiner_.learn();
-  }
-  sink_.put(run_.timing());
-  outcome_.skipped_ticks += run_.timing().skipped;
-  run_.end();
 }
 
 }  // namespace sinerig

@@ -1,7 +1,6 @@
 // Plays a plan through the loop: wait, write, read, guard, correlate, hand over.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -14,31 +13,29 @@
 #include "sweep/leveller.h"
 #include "sweep/plan.h"
 #include "sweep/records.h"
+#include "sweep/recovery.h"
 #include "sweep/refiner.h"
+#include "sweep/run_control.h"
 #include "sweep/runner_settings.h"
 
 namespace sinerig {
-
-// Shared between the loop and whoever watches or stops it.
-struct RunControl {
-  std::atomic<int> stop_requests{0};  // 1: ramp down, 2: neutral at once
-  std::atomic<std::uint32_t> dwell{0};
-  std::atomic<std::uint64_t> tick{0};
-};
 
 struct RunOutcome {
   Trip trip;  // cause none: the plan ran to its end
   std::uint32_t dwells_done = 0;
   std::uint64_t ticks = 0;
   std::uint64_t skipped_ticks = 0;
+  std::uint32_t faults = 0;      // of devices, after which they were or were to be armed again
+  std::uint32_t soft_trips = 0;  // after which a dwell was tried again at a lower amplitude
 };
 
 class SweepRunner {
  public:
-  // All memory of the loop is taken here. The actuator, sensors, clock, guard and sink must outlive
-  // the runner; `plan` is copied.
+  // All memory of the loop is taken here. What is referred to must outlive the runner; `plan` is
+  // copied. Without `rearm` a device's fault ends the sweep, whatever the settings say.
   SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, Actuator& actuator,
-              std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink);
+              std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink,
+              Rearm* rearm = nullptr);
 
   // Runs to the end of the plan, a trip of the guard or a stop request. The actuator is released on
   // every way out.
@@ -49,12 +46,22 @@ class SweepRunner {
   void exchange(double command, const Tick& tick) noexcept SINERIG_NONBLOCKING;
   bool applied_late(std::int64_t offset_ns) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
-  void next_dwell() noexcept;
+  bool under_way() const noexcept { return dwell_ < dwells_.size() && run_.begun(); }
+  bool go_on() noexcept;
+  bool pause(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
+  bool recover(RunControl& control) noexcept;
+  void conclude_dwell() noexcept;
+  bool pass_preflight() noexcept;
   bool try_again() noexcept;
+  void repeat_dwell() noexcept;
+  void tell_trip(EventKind kind) noexcept;
   void finish_dwell() noexcept;
+  void next_dwell() noexcept;
   void refine() noexcept;
   void note_sensor(std::size_t sensor, const Sample& sample, std::uint64_t tick) noexcept;
   void announce(const Event& event) noexcept { sink_.put(event); }
+
+  static constexpr std::uint64_t no_tick = UINT64_MAX;
 
   SweepPlan plan_;
   RunnerSettings settings_;
@@ -68,6 +75,7 @@ class SweepRunner {
   Refiner refiner_;
   Excitation excitation_;
   Leveller leveller_;
+  Recovery recovery_;
   DwellRun run_;
   std::vector<Observation> observations_;  // applied, sensors: this tick
   double command_ = 0.0;                   // this tick
@@ -75,7 +83,13 @@ class SweepRunner {
 
   std::uint32_t dwell_ = 0;
   double scale_ = 1.0;         // of this dwell's planned amplitudes
-  std::uint32_t attempt_ = 0;  // at this dwell; scale_ is set already where it is not the first
+  bool scale_chosen_ = false;  // for the attempt that begins
+  std::uint32_t attempt_ = 0;  // at this dwell
+  bool preflight_;             // is what the dwell is for
+  bool from_rest_ = true;      // the loop begins, or goes on after a fault
+  bool paused_ = false;        // by a soft limit, the command at neutral
+  std::uint64_t pause_left_ = 0;
+  std::uint64_t trip_told_ = no_tick;  // tick of the trip that has been announced
   bool command_lost_ = false;
   bool command_late_ = false;
   bool applied_known_ = false;

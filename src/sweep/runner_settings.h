@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "sweep/measurement.h"
+#include "sweep/preflight.h"
+#include "sweep/retry.h"
 
 namespace sinerig {
 
@@ -15,6 +17,8 @@ struct RunnerSettings {
   double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
   double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
   double max_gap_s = 1.0;        // without a tick: the machine slept, nobody minded the actuator
+  RetrySettings retry{};
+  PreflightSettings preflight{};
 };
 
 }  // namespace sinerig

@@ -16,6 +16,8 @@ class CollectingSink final : public RecordSink {
     if (const auto* block = std::get_if<Block>(&record)) blocks.push_back(*block);
     if (const auto* timing = std::get_if<DwellTiming>(&record)) timings.push_back(*timing);
     if (const auto* event = std::get_if<Event>(&record)) events.push_back(*event);
+    if (const auto* preflight = std::get_if<Preflight>(&record)) preflights.push_back(*preflight);
+    if (const auto* note = std::get_if<Note>(&record)) notes.push_back(*note);
   }
   void put_sample(const TickSamples& tick) noexcept override {
     const OutsideTheLoop noting_down;
@@ -27,6 +29,8 @@ class CollectingSink final : public RecordSink {
   std::vector<Block> blocks;
   std::vector<DwellTiming> timings;
   std::vector<Event> events;
+  std::vector<Preflight> preflights;
+  std::vector<Note> notes;
   std::vector<TickSamples> samples;
 };
 

@@ -61,10 +61,12 @@ class FakeActuator final : public Actuator {
     last = neutral_;
     released = true;
     ++releases;
+    if (on_release) on_release();
   }
 
   std::function<Fault(std::uint64_t tick)> fault_at;
   std::function<double(double command)> apply;
+  std::function<void()> on_release;
 
   std::vector<Write> writes;
   double last = 0.0;  // what it was given last

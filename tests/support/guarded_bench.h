@@ -53,10 +53,10 @@ struct GuardedBench {
     plan = plan_sweep(sweep, {}, rate_hz);
   }
 
-  RunOutcome run() {
+  RunOutcome run(Rearm* rearm = nullptr) {
     Guard guard{settings, 1.0 / rate_hz};
     Sensor* const sensors[] = {&sensor};
-    SweepRunner runner{plan, {}, clock, actuator, sensors, guard, sink};
+    SweepRunner runner{plan, runner_settings, clock, actuator, sensors, guard, sink, rearm};
     return runner.run(control);
   }
 
@@ -73,6 +73,7 @@ struct GuardedBench {
                     }};
   StallingSink sink{clock};
   GuardSettings settings;
+  RunnerSettings runner_settings;
   RunControl control;
   SweepPlan plan;
 };

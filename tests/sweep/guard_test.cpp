@@ -24,6 +24,7 @@ struct Violation {
   std::uint64_t last_planned;  // the last tick whose command is the planned one
   std::uint64_t tripped_at;
   bool at_once = false;
+  bool soft = false;
 };
 
 // Sets one violation up at about `tick` and says what the guard has to make of it.
@@ -93,6 +94,76 @@ Violation violate(GuardedBench& bench, int kind, std::uint64_t tick, std::mt1993
       return {TripCause::command_slew, 0, 1};
     }
     case 10: bench.sink.stalled_from = tick; return {TripCause::recorder_stalled, tick, tick};
+    case 11: {
+      limits.soft_max = between(0.21, 5.0);
+      limits.soft_min = between(-5.0, 0.19);
+      sensor_reads(random() % 2 == 0 ? limits.soft_max * between(1.0001, 10.0)
+                                     : limits.soft_min - between(0.0001, 10.0));
+      return {TripCause::channel_limit, tick, tick, false, true};
+    }
+    case 12: {
+      // A constant velocity v behind the filter is v (1 − q^k) after k samples.
+      const double velocity = between(1.0, 100.0);
+      const auto samples = 1 + random() % 4;
+      limits.derivative_filter_s = between(0.0, 0.01);
+      const double q = limits.derivative_filter_s / (limits.derivative_filter_s + 1e-3);
+      const double bound = velocity * (1.0 - std::pow(q, static_cast<double>(samples) - 0.5));
+      const bool soft = random() % 2 == 0;
+      (soft ? limits.velocity.soft : limits.velocity.hard) = bound;
+      bench.sensor.value = [=](std::uint64_t now) {
+        return GuardedBench::reading +
+               (now < tick ? 0.0 : velocity * 1e-3 * static_cast<double>(now - tick + 1));
+      };
+      const std::uint64_t found = tick + samples - 1;
+      return {TripCause::channel_velocity, found, found, false, soft};
+    }
+    case 13: {
+      // A step of the velocity is v/T of acceleration; behind both filters T²/(T + τ)² of it.
+      const double velocity = between(1.0, 100.0);
+      limits.derivative_filter_s = between(0.0, 0.01);
+      const double passed = std::pow(1e-3 / (limits.derivative_filter_s + 1e-3), 2.0);
+      const bool soft = random() % 2 == 0;
+      (soft ? limits.acceleration.soft : limits.acceleration.hard) =
+          1e3 * velocity * passed * between(0.5, 0.999);
+      bench.sensor.value = [=](std::uint64_t now) {
+        return GuardedBench::reading +
+               (now < tick ? 0.0 : velocity * 1e-3 * static_cast<double>(now - tick + 1));
+      };
+      return {TripCause::channel_acceleration, tick, tick, false, soft};
+    }
+    case 14: {
+      const double bound = between(0.05, 0.35);
+      const std::uint64_t lasting = random() % 3;
+      const bool soft = random() % 2 == 0;
+      (soft ? limits.following.soft : limits.following.hard) = bound;
+      limits.following_ns = static_cast<std::int64_t>(lasting) * 1'000'000;
+      const auto away = [&](std::uint64_t at) {
+        return std::abs(bench.planned(at) - GuardedBench::reading) > bound;
+      };
+      std::uint64_t found = 0;
+      for (std::uint64_t in_a_row = 0; in_a_row <= lasting; ++found)
+        in_a_row = away(found) ? in_a_row + 1 : 0;
+      --found;
+      return {TripCause::following_error, found, found, false, soft};
+    }
+    case 15:
+      limits.allowed = {0.0, GuardedBench::reading, 8.0};
+      sensor_reads(between(1.0, 7.0));
+      return {TripCause::channel_code, tick, tick};
+    case 16: {
+      const std::uint64_t patience = 1 + random() % 5;
+      bench.settings.max_age_ns = 1'000'000'000;
+      limits.max_age_ns = static_cast<std::int64_t>(patience) * 1'000'000;
+      bench.sensor.fault_at = [=](std::uint64_t now) {
+        return now >= tick ? Fault::timeout : Fault::none;
+      };
+      return {TripCause::channel_age, tick + patience, tick + patience};
+    }
+    case 17:
+      bench.sensor.fault_at = [=](std::uint64_t now) {
+        return now >= tick ? Fault::interlock : Fault::none;
+      };
+      return {TripCause::interlock_open, tick, tick};
     default: {
       const int requests = 1 + static_cast<int>(random() % 2);
       bench.sensor.value = [&bench, tick, requests](std::uint64_t now) {
@@ -114,11 +185,13 @@ TEST(RandomViolations, ChangeTheCommandWithinATickRampItAndReleaseTheActuator) {
     GuardedBench bench{frequencies_hz[random() % 6]};
     bench.settings.stop_ramp_ticks = random() % 3 == 0 ? 0 : random() % 40;
     const std::uint64_t tick = 1 + random() % (bench.plan.min_samples() - 8);
-    const Violation expected = violate(bench, static_cast<int>(random() % 12), tick, random);
+    bench.runner_settings.retry = {.soft = 0, .soft_in_all = 0, .soft_wait_s = 0.0};
+    const Violation expected = violate(bench, static_cast<int>(random() % 19), tick, random);
 
     const RunOutcome outcome = bench.run();
     ASSERT_STREQ(to_string(outcome.trip.cause), to_string(expected.cause));
     ASSERT_EQ(outcome.trip.tick, expected.tripped_at);
+    ASSERT_EQ(outcome.trip.soft, expected.soft);
 
     const std::uint64_t ramp =
         expected.at_once ? 1 : std::max<std::uint64_t>(1, bench.settings.stop_ramp_ticks);
@@ -234,6 +307,44 @@ TEST(Guard, ToldNotToWatchTheAgeOrTheWritesDoesNot) {
   EXPECT_FALSE(guard.trip().tripped());
 }
 
+TEST(Guard, LetsAHardLimitTakeThePlaceOfASoftOneOnTheSameRamp) {
+  Guard guard{{.stop_ramp_ticks = 10, .channels = {{.max = 2.0, .soft_max = 1.0}}}, 1e-3};
+  guard.admit(1.0, 0, 1);
+  guard.observe(0, {.value = 1.5, .time_ns = 1}, 1, 1);
+  EXPECT_TRUE(guard.trip().soft);
+  EXPECT_DOUBLE_EQ(guard.admit(1.0, 2, 1), 0.9);
+  guard.observe(0, {.value = 2.5, .time_ns = 2}, 2, 2);
+  EXPECT_FALSE(guard.trip().soft);
+  EXPECT_EQ(guard.trip().limit, 2.0);
+  EXPECT_DOUBLE_EQ(guard.admit(1.0, 3, 1), 0.8);
+  EXPECT_DOUBLE_EQ(guard.trip().command, 0.8);
+  guard.observe(0, {.value = 1.5, .time_ns = 3}, 3, 3);
+  EXPECT_EQ(guard.trip().limit, 2.0);
+}
+
+TEST(Guard, StopsALoopThatIsLaterThanAllowed) {
+  Guard guard{{.max_lateness_ns = 500'000, .channels = {}}, 1e-3};
+  guard.observe_lateness(500'000, 6);
+  EXPECT_FALSE(guard.trip().tripped());
+  guard.observe_lateness(620'000, 7);
+  EXPECT_EQ(guard.admit(1.0, 7, 1), 0.0);
+  EXPECT_EQ(describe(guard.trip(), {}),
+            "the loop was 0.00062 s late, its limit is 0.0005 s (tick 7; command changed to 0)");
+}
+
+TEST(Guard, BeginsAnewAtNeutralAfterAStop) {
+  Guard guard{{.slew_per_s = 100.0, .channels = {{.rate_per_s = 1.0}}}, 1e-3};
+  guard.observe(0, {.value = 5.0, .time_ns = 1}, 1, 1);
+  guard.observe_write({.fault = Fault::device}, 2);
+  guard.admit(0.05, 3, 1);
+  ASSERT_TRUE(guard.finished());
+  guard.resume();
+  EXPECT_FALSE(guard.trip().tripped());
+  guard.observe(0, {.value = 9.0, .time_ns = 9}, 9, 9);
+  EXPECT_EQ(guard.admit(0.1, 10, 1), 0.1);
+  EXPECT_FALSE(guard.trip().tripped());
+}
+
 TEST(Guard, RefusesSettingsThatCannotBeMeant) {
   const auto message_of = [](const GuardSettings& settings) -> std::string {
     try {
@@ -251,6 +362,8 @@ TEST(Guard, RefusesSettingsThatCannotBeMeant) {
   EXPECT_EQ(message_of({.channels = {{.min = 1.0, .max = 1.0}}}), window);
   EXPECT_EQ(message_of({.channels = {{.rate_per_s = 0.0}}}), window);
   EXPECT_EQ(message_of({.channels = {{.max = nan}}}), window);
+  EXPECT_EQ(message_of({.channels = {{.soft_min = 2.0, .soft_max = 1.0}}}),
+            "a channel's soft window must have min < max");
 }
 
 struct Description {
@@ -295,6 +408,26 @@ INSTANTIATE_TEST_SUITE_P(
         Description{{.cause = TripCause::actuator_fault, .value = 2.0, .limit = 2.0},
                     "2 faulty writes to the actuator in a row (limit 2) (tick 0; command changed "
                     "to 0)"},
+        Description{{.cause = TripCause::channel_limit,
+                     .soft = true,
+                     .channel = 1,
+                     .value = 3.2,
+                     .limit = 3.0,
+                     .tick = 812,
+                     .command = 0.5},
+                    "gyro = 3.2 is outside its soft limit 3 (tick 812; command changed to 0.5)"},
+        Description{{.cause = TripCause::channel_velocity, .value = 70.0, .limit = 50.0},
+                    "encoder moves at 70 per second, its limit is 50 (tick 0; command changed to "
+                    "0)"},
+        Description{
+            {.cause = TripCause::channel_acceleration, .soft = true, .value = 70.0, .limit = 50.0},
+            "encoder accelerates by 70 per second squared, its soft limit is 50 (tick 0; "
+            "command changed to 0)"},
+        Description{{.cause = TripCause::following_error, .value = 0.2, .limit = 0.1},
+                    "encoder is 0.2 away from what was applied, its limit is 0.1 (tick 0; command "
+                    "changed to 0)"},
+        Description{{.cause = TripCause::channel_code, .channel = 1, .value = 7.0},
+                    "gyro = 7 is none of its allowed values (tick 0; command changed to 0)"},
         Description{{.cause = TripCause::recorder_stalled},
                     "the recorder no longer takes points (tick 0; command changed to 0)"}));
 

@@ -1,0 +1,54 @@
+#include "sweep/recovery.h"
+
+#include <algorithm>
+
+namespace sinerig {
+
+Recovery::Recovery(const RetrySettings& settings, Clock& clock, RecordSink& sink, Rearm* rearm)
+    : settings_{settings},
+      clock_{clock},
+      sink_{sink},
+      rearm_{rearm},
+      faults_{settings.faults, settings.faults_in_all},
+      soft_{settings.soft, settings.soft_in_all} {}
+
+Recovery::End Recovery::after_fault(std::uint32_t dwell, RunControl& control) noexcept {
+  const std::string reason = rearm_->fault_reason();
+  if (!reason.empty()) note(EventKind::device_fault, dwell, reason);
+  while (faults_.spend()) {
+    sink_.put(Event{.kind = EventKind::rearming,
+                    .dwell = dwell,
+                    .tick = clock_.now().tick,
+                    .value = settings_.wait_s});
+    if (const End end = wait(dwell, control); end != End::armed) return end;
+    const std::string obstacle = rearm_->arm_again();
+    if (obstacle.empty()) {
+      sink_.put(Event{.kind = EventKind::rearmed, .dwell = dwell, .tick = clock_.now().tick});
+      return End::armed;
+    }
+    note(EventKind::rearm_failed, dwell, obstacle);
+  }
+  return End::used_up;
+}
+
+Recovery::End Recovery::wait(std::uint32_t dwell, RunControl& control) noexcept {
+  const std::uint64_t begin = clock_.now().tick;
+  const double ticks = settings_.wait_s * clock_.grid().rate_hz();
+  control.dwell.store(dwell, std::memory_order_relaxed);
+  std::uint64_t now = begin;
+  while (static_cast<double>(now - begin) < ticks) {
+    if (control.stop_requests.load(std::memory_order_relaxed) > 0) return End::stop_requested;
+    if (!sink_.flush()) return End::recorder_stalled;
+    now = clock_.wait().index;
+    control.tick.store(now, std::memory_order_relaxed);
+  }
+  return End::armed;
+}
+
+void Recovery::note(EventKind kind, std::uint32_t dwell, const std::string& text) noexcept {
+  Note note{.kind = kind, .dwell = dwell, .tick = clock_.now().tick};
+  std::copy_n(text.begin(), std::min(text.size(), note.text.size() - 1), note.text.begin());
+  sink_.put(note);
+}
+
+}  // namespace sinerig

@@ -1,0 +1,188 @@
+// The order of things: which dwell comes next, at what level, and which is repeated. The tick
+// itself is in runner.cpp.
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "sweep/runner.h"
+
+namespace sinerig {
+
+// After the actuator has been released: true when everything is armed again and the dwell begins
+// anew.
+bool SweepRunner::recover(RunControl& control) noexcept {
+  if (!under_way() || !recovery_.worth_it(guard_.trip())) return false;
+  tell_trip(EventKind::tripped);
+  announce({.kind = EventKind::released, .dwell = dwell_, .tick = last_tick_});
+  const Recovery::End end = recovery_.after_fault(dwell_, control);
+  last_tick_ = clock_.now().tick;
+  if (end == Recovery::End::used_up) return false;
+  guard_.resume();
+  if (end != Recovery::End::armed) {
+    guard_.stop(end == Recovery::End::stop_requested ? TripCause::stop_requested
+                                                     : TripCause::recorder_stalled,
+                last_tick_);
+    guard_.admit(plan_.baseline.neutral, last_tick_, 1);
+    return false;
+  }
+  excitation_.rest();
+  from_rest_ = true;
+  applied_known_ = false;
+  paused_ = false;
+  repeat_dwell();
+  return true;
+}
+
+// A soft limit has taken the command to neutral: wait, then try the dwell again, lower. False where
+// the sweep ends here.
+bool SweepRunner::pause(std::uint64_t ticks) noexcept {
+  const RetrySettings& retry = settings_.retry;
+  if (!std::exchange(paused_, true)) {
+    tell_trip(EventKind::limited);
+    pause_left_ = static_cast<std::uint64_t>(retry.soft_wait_s * plan_.rate_hz);
+  }
+  if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, last_tick_);
+  if (pause_left_ > 0) {
+    pause_left_ -= std::min(pause_left_, ticks);
+    return true;
+  }
+  paused_ = false;
+  if (recovery_.spend_soft()) {
+    scale_ *= retry.soft_factor;
+    announce({.kind = EventKind::retried,
+              .dwell = dwell_,
+              .tick = last_tick_,
+              .value = scale_ * dwells_[dwell_]->tones.front().amplitude});
+    repeat_dwell();
+  } else if (recovery_.soft_all_spent()) {
+    trip_told_ = no_tick;  // as the end of a dwell; now as that of the sweep
+    return false;
+  } else {
+    run_.conclude();
+    finish_dwell();
+    next_dwell();
+  }
+  guard_.resume();
+  excitation_.rest();
+  return go_on();
+}
+
+void SweepRunner::tell_trip(EventKind kind) noexcept {
+  const Trip& trip = guard_.trip();
+  if (std::exchange(trip_told_, trip.tick) == trip.tick) return;
+  const bool of_sensor = trip.of_sensor();
+  announce({.kind = kind,
+            .channel = static_cast<std::uint16_t>(of_sensor ? first_sensor_channel + trip.channel
+                                                            : command_channel),
+            .dwell = dwell_,
+            .tick = trip.tick,
+            .value = trip.value,
+            .trip = trip});
+}
+
+void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
+  const Dwell& dwell = *dwells_[dwell_];
+  if (!scale_chosen_) {
+    scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
+    if (preflight_) scale_ = std::min(scale_, settings_.preflight.level);
+  }
+  excitation_.start(dwell, scale_);
+  run_.begin(dwell, dwell_, attempt_, scale_, tick);
+  announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
+}
+
+void SweepRunner::conclude_dwell() noexcept {
+  run_.conclude();
+  if (preflight_) {
+    if (!pass_preflight()) return;
+    preflight_ = false;
+    repeat_dwell();
+    scale_chosen_ = false;
+    return;
+  }
+  if (try_again()) return;
+  finish_dwell();
+  next_dwell();
+}
+
+// Every response is told of; the first that fails trips the guard.
+bool SweepRunner::pass_preflight() noexcept {
+  bool passed = true;
+  for (std::size_t pair = 0; pair < run_.responses(); ++pair) {
+    const Point point = run_.point(pair, 0);
+    const Trip trip = check_preflight(settings_.preflight, point, pair == 0);
+    sink_.put(preflight_of(point, !trip.tripped(), last_tick_));
+    if (!trip.tripped()) continue;
+    passed = false;
+    guard_.trip(trip.cause, trip.channel, trip.value, trip.limit, last_tick_);
+  }
+  return passed;
+}
+
+// The same dwell once more, at scale_.
+void SweepRunner::repeat_dwell() noexcept {
+  outcome_.skipped_ticks += run_.timing().skipped;
+  scale_chosen_ = true;
+  ++attempt_;
+  run_.end();
+}
+
+void SweepRunner::next_dwell() noexcept {
+  attempt_ = 0;
+  scale_chosen_ = false;
+  recovery_.next_dwell();
+  ++dwell_;
+  ++outcome_.dwells_done;
+  if (dwell_ == dwells_.size()) refine();
+}
+
+// One more dwell where the response between two points is not known.
+void SweepRunner::refine() noexcept {
+  if (dwells_.size() == plan_.dwells.size() + plan_.refinement.most_points) return;
+  const double disagreement_db = refiner_.worst_db();
+  const std::optional<std::size_t> candidate = refiner_.next();
+  if (!candidate) return;
+  dwells_.push_back(&plan_.refinement.candidates[*candidate]);  // within what was reserved
+  announce({.kind = EventKind::refined,
+            .dwell = dwell_,
+            .tick = last_tick_,
+            .value = disagreement_db,
+            .candidate = static_cast<std::uint32_t>(*candidate)});
+}
+
+bool SweepRunner::try_again() noexcept {
+  const double planned = dwells_[dwell_]->tones.front().amplitude;
+  // What a soft limit has brought down is not brought up again.
+  if (recovery_.lowered()) {
+    leveller_.accept(run_.point(0, 0));
+    return false;
+  }
+  const std::optional<double> scale = leveller_.retry(run_.point(0, 0), scale_, planned);
+  if (!scale) return false;
+  announce(
+      {.kind = EventKind::retried, .dwell = dwell_, .tick = last_tick_, .value = *scale * planned});
+  scale_ = *scale;
+  repeat_dwell();
+  return true;
+}
+
+void SweepRunner::finish_dwell() noexcept {
+  const Dwell& dwell = *dwells_[dwell_];
+  for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
+    const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
+    for (std::size_t pair = 0; pair < run_.responses(); ++pair) {
+      const Point point = run_.point(pair, tone);
+      sink_.put(point);
+      if (refining && point.status == PointStatus::good) {
+        refiner_.set(pair, point.response, point.covariance.mean_variance());
+      }
+    }
+    if (refining) refiner_.learn();
+  }
+  sink_.put(run_.timing());
+  outcome_.skipped_ticks += run_.timing().skipped;
+  run_.end();
+}
+
+}  // namespace sinerig
