@@ -33,6 +33,10 @@ class Device {
   // looked at is opened and never armed.
   virtual void arm() {}
 
+  // After a fault, the actuator released: switches the device on again, which may have lost its
+  // settings in a power cut meanwhile. Throws like open().
+  virtual void rearm() { arm(); }
+
   // Why a command had a fault or a sensor is no longer believed, for people; empty where there is
   // nothing to say.
   virtual std::string fault_reason() const { return {}; }

@@ -4,6 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "sim/drive_faults.h"
+
 namespace sinerig::sim {
 
 namespace {
@@ -134,6 +136,30 @@ ActuatorImperfections read_actuator(const Section& section) {
   return actuator;
 }
 
+// Of the simulated connection, in seconds of the loop.
+DriveFaultSettings read_faults(const Section& section) {
+  DriveFaultSettings faults;
+  const auto ascending = [&](std::string_view key, const std::vector<double>& times) {
+    if (!std::is_sorted(times.begin(), times.end())) section.refuse(key, "must ascend");
+  };
+  if (section.has("trips_at_s")) faults.trips_at_s = section.numbers("trips_at_s", zero_or_more);
+  ascending("trips_at_s", faults.trips_at_s);
+  faults.failing_arms =
+      static_cast<std::uint32_t>(section.integer("failing_arms", {.min = 0.0, .max = 1e6}, 0));
+  std::vector<double> times;
+  if (section.has("connection_lost_s")) {
+    for (const std::vector<double>& row : section.rows("connection_lost_s", zero_or_more)) {
+      if (row.size() != 2) section.refuse("connection_lost_s", "every row is [from, to]");
+      faults.lost.push_back({.from_s = row[0], .to_s = row[1]});
+      times.insert(times.end(), row.begin(), row.end());
+    }
+  }
+  ascending("connection_lost_s", times);
+  return faults;
+}
+
+constexpr std::string_view error_code = "error_code";
+
 // "output" of a sensor: a row of the plant, or a signal of the loop around it.
 void read_signal(const Section& section, const SimulatedRigSettings& rig, SimulatedSensor& sensor) {
   constexpr std::pair<std::string_view, Signal> loop_signals[] = {
@@ -145,11 +171,13 @@ void read_signal(const Section& section, const SimulatedRigSettings& rig, Simula
     sensor.signal = signal;
     return;
   }
+  if (name == error_code) return;
   const auto found = std::find(outputs.begin(), outputs.end(), name);
   if (found == outputs.end()) {
     std::string names;
     for (const std::string& each : outputs) names += " \"" + each + "\"";
     if (rig.controller) names += " \"error\" \"control\" \"plant_input\"";
+    names += " \"error_code\"";
     section.refuse("output", "the plant has no such output; it has" + names);
   }
   sensor.output = static_cast<std::size_t>(found - outputs.begin());
@@ -181,15 +209,44 @@ SimulatedSensor read_sensor(const Section& section, const SimulatedRigSettings& 
 
 class SimDevice final : public Device {
  public:
-  explicit SimDevice(SimulatedRigSettings settings) : settings_{std::move(settings)} {}
+  // `codes`: which of the sensors is no output of the plant but the drive's error code.
+  SimDevice(SimulatedRigSettings settings, DriveFaultSettings faults, std::vector<bool> codes)
+      : settings_{std::move(settings)},
+        fault_settings_{std::move(faults)},
+        codes_{std::move(codes)} {}
 
-  void open(const Clock& clock) override { rig_.emplace(settings_, clock); }
-  Actuator* actuator() noexcept override { return &rig_->actuator(); }
-  Sensor& sensor(std::size_t index) noexcept override { return rig_->sensor(index); }
+  void open(const Clock& clock) override {
+    rig_.emplace(settings_, clock);
+    faults_.emplace(fault_settings_, clock);
+    for (std::size_t i = 0; i < codes_.size(); ++i) sensors_.push_back(make_sensor(i));
+    if (fault_settings_.any()) drive_.emplace(rig_->actuator(), *faults_, settings_.neutral);
+  }
+  void arm() override { faults_->arm(); }
+  std::string fault_reason() const override {
+    if (faults_->lost()) return "the connection to the simulated drive is lost";
+    return faults_->tripped() ? "the simulated drive has tripped" : "";
+  }
+  bool measures(std::size_t sensor) const override { return !codes_[sensor]; }
+  Actuator* actuator() noexcept override { return drive_ ? &*drive_ : &rig_->actuator(); }
+  Sensor& sensor(std::size_t index) noexcept override {
+    return sensors_[index] ? *sensors_[index] : rig_->sensor(index);
+  }
 
  private:
+  // Null: the plant's own, which nothing stands in front of.
+  std::unique_ptr<Sensor> make_sensor(std::size_t index) {
+    if (codes_[index]) return std::make_unique<ErrorCode>(*faults_);
+    if (!fault_settings_.any()) return nullptr;
+    return std::make_unique<FaultySensor>(rig_->sensor(index), *faults_);
+  }
+
   SimulatedRigSettings settings_;
+  DriveFaultSettings fault_settings_;
+  std::vector<bool> codes_;
   std::optional<SimulatedRig> rig_;
+  std::optional<DriveFaults> faults_;
+  std::vector<std::unique_ptr<Sensor>> sensors_;
+  std::optional<FaultyDrive> drive_;
 };
 
 std::unique_ptr<Device> configure(const DeviceRequest& request) {
@@ -206,10 +263,13 @@ std::unique_ptr<Device> configure(const DeviceRequest& request) {
   read_controller(plant, settings);
   settings.actuator = read_actuator(request.actuator->section);
   settings.neutral = request.rig.guard.neutral;
+  std::vector<bool> codes;
   for (const config::Channel* sensor : request.sensors) {
+    codes.push_back(sensor->section.text("output", "") == error_code);
     settings.sensors.push_back(read_sensor(sensor->section, settings, 1.0 / request.rig.rate_hz));
   }
-  return std::make_unique<SimDevice>(std::move(settings));
+  return std::make_unique<SimDevice>(std::move(settings), read_faults(request.actuator->section),
+                                     std::move(codes));
 }
 
 }  // namespace

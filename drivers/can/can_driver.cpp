@@ -75,6 +75,12 @@ class CanDevice final : public Device {
     if (actuator_) actuator_->arm();
   }
 
+  void rearm() override {
+    if (!actuator_) return;
+    actuator_->start();
+    actuator_->arm();
+  }
+
   Actuator* actuator() noexcept override { return actuator_ ? &*actuator_ : nullptr; }
   Sensor& sensor(std::size_t index) noexcept override { return *sensors_[index]; }
 

@@ -163,6 +163,13 @@ void Link::reconnect_now_and_then() noexcept {
   next_reconnect_ns_ = monotonic_now_ns() + reconnect_period_ns;
 }
 
+void Link::reconnect() {
+  const std::scoped_lock lock{mutex_};
+  if (transport_.connected() || transport_.try_connect()) return;
+  throw std::runtime_error(settings_.connection.address() +
+                           ": no connection; is the device powered and on the network?");
+}
+
 void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept {
   exchange.number = order.number;
   exchange.handed_over_ns = order.handed_over_ns;

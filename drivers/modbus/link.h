@@ -60,6 +60,9 @@ class Link {
     return use(transport_);
   }
 
+  // Where the connection is gone, outside the loop. Throws std::runtime_error.
+  void reconnect();
+
   // Exchanges as in the loop, outside of it; with a command where one is given. Falls back from
   // function 23 to 16 where the device does not know it and the rig file leaves the choice.
   Pace try_out(std::optional<double> command, std::size_t exchanges);

@@ -64,6 +64,13 @@ class ModbusDevice final : public Device {
     }
   }
 
+  void rearm() override {
+    for (const auto& link : links_) link->reconnect();
+    if (!actuator_) return;
+    actuator_->start();
+    actuator_->arm();
+  }
+
   Actuator* actuator() noexcept override { return actuator_ ? &*actuator_ : nullptr; }
   Sensor& sensor(std::size_t index) noexcept override { return *sensors_[index]; }
 

@@ -54,14 +54,16 @@ void ConfiguredRig::choose_responses() {
   std::vector<bool> measures(rig_.sensors.size(), true);
   for (const Part& part : parts_) {
     for (std::size_t i = 0; i < part.sensors.size(); ++i)
-      measures[part.sensors[i]] = part.device->measures(i);
+      measures[part.sensors[i]] = part.device->measures(i) && !rig_.sensors[part.sensors[i]].health;
   }
   for (std::size_t i = 0; i < measures.size(); ++i) {
     if (measures[i]) rig_.runner.responses.push_back({.input = 0, .output = 1 + i});
   }
   if (rig_.runner.responses.empty())
-    throw config::ConfigError(rig_.file->name() +
-                              ": no sensor measures a response; add one beside the interlock");
+    throw config::ConfigError(
+        rig_.file->name() +
+        ": no sensor measures a response; add one beside the interlock and the "
+        "health channels");
 }
 
 void ConfiguredRig::open() {
@@ -77,6 +79,16 @@ void ConfiguredRig::open() {
 
 void ConfiguredRig::arm() {
   for (Part& part : parts_) part.device->arm();
+}
+
+std::string ConfiguredRig::arm_again() {
+  try {
+    for (Part& part : parts_) part.device->rearm();
+    return {};
+  } catch (const std::exception& refused) {
+    actuator_->release();
+    return refused.what();
+  }
 }
 
 std::vector<Remark> ConfiguredRig::remarks() const {

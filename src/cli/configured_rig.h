@@ -8,10 +8,11 @@
 #include "config/rig.h"
 #include "drivers/device.h"
 #include "sweep/clock.h"
+#include "sweep/retry.h"
 
 namespace sinerig::cli {
 
-class ConfiguredRig {
+class ConfiguredRig final : public Rearm {
  public:
   // Reads the file, lets each driver read its keys, refuses every key that nobody knows.
   // Throws config::ConfigError.
@@ -23,7 +24,8 @@ class ConfiguredRig {
   // Acquires the hardware; the accessors below are valid from here on.
   void open();
   void arm();
-  std::string fault_reason() const;
+  std::string fault_reason() const override;
+  std::string arm_again() override;
   std::vector<Remark> remarks() const;
   Actuator& actuator() { return *actuator_; }
   const std::vector<Sensor*>& sensors() const { return sensors_; }

@@ -10,6 +10,7 @@
 #include "cli/live_view.h"
 #include "cli/report_file.h"
 #include "cli/run_teller.h"
+#include "cli/service_notifier.h"
 #include "cli/stop_on_signal.h"
 #include "record/recorder.h"
 #include "sweep/outbox.h"
@@ -71,15 +72,18 @@ class PointInbox {
 // Who hears of a run: the terminal, a script, the live page. Each may be absent.
 struct Audience {
   RunTeller& teller;
+  ServiceNotifier& service;
   LiveView* view;
   record::Recorder::Samples samples;
 };
 
 // The loop on its own thread, its story told on this one, until both the loop and the recorder are
 // done.
-RunOutcome play(SweepRunner& runner, RunControl& control, Outbox& outbox,
+RunOutcome play(const SweepPlan& plan, SweepRunner& runner, RunControl& control, Outbox& outbox,
                 record::SweepWriter& writer, const Audience& audience) {
   PointInbox inbox;
+  report::RemainingTime time{plan};
+  audience.service.ready();
   const auto observe = [&](const Record& record) {
     inbox.put(record);
     if (audience.view != nullptr) audience.view->run().take(record);
@@ -95,7 +99,12 @@ RunOutcome play(SweepRunner& runner, RunControl& control, Outbox& outbox,
   }};
   const auto tell = [&] {
     for (const Point& point : inbox.take()) audience.teller.point(point);
-    audience.teller.update(control.dwell.load(), control.tick.load());
+    const std::uint32_t dwell = control.dwell.load();
+    const std::uint64_t tick = control.tick.load();
+    audience.teller.update(dwell, tick);
+    audience.service.progress(tick, std::chrono::steady_clock::now());
+    time.update(dwell, tick);
+    audience.service.status(status_text(plan, dwell, time));
   };
   while (!done.load()) {
     tell();
@@ -137,6 +146,9 @@ std::string reason_of(const RunOutcome& outcome, const ConfiguredRig& configured
   const bool by_device = outcome.trip.cause == TripCause::actuator_fault ||
                          outcome.trip.cause == TripCause::channel_age;
   if (by_device && !configured.fault_reason().empty()) reason += ": " + configured.fault_reason();
+  if (outcome.faults > 0) {
+    reason += " (" + std::to_string(outcome.faults) + " tries to arm again are spent, [retry])";
+  }
   return reason;
 }
 
@@ -173,16 +185,24 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   }
   RunnerSettings settings = rig.runner;
   if (view) settings.record_samples = true;
-  SweepRunner runner{
-      plan,  settings, view ? view->clock() : clock, configured.actuator(), configured.sensors(),
-      guard, outbox};
+  SweepRunner runner{plan,
+                     settings,
+                     view ? view->clock() : clock,
+                     configured.actuator(),
+                     configured.sensors(),
+                     guard,
+                     outbox,
+                     &configured};
   const bool keep_samples = rig.runner.record_samples || !view;
-  const RunOutcome outcome = play(runner, control, outbox, writer,
+  ServiceNotifier service;
+  const RunOutcome outcome = play(plan, runner, control, outbox, writer,
                                   {.teller = teller,
+                                   .service = service,
                                    .view = view.get(),
                                    .samples = keep_samples ? record::Recorder::Samples::written
                                                            : record::Recorder::Samples::watched});
 
+  service.stopping();
   RunEnd end{.outcome = outcome_name(outcome),
              .reason = reason_of(outcome, configured),
              .sweep_file = path,

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <utility>
 
+#include "config/limits.h"
 #include "sweep/clock.h"
 #include "sweep/records.h"
 
@@ -179,15 +180,6 @@ MotionLimits read_motion(const Section& limits) {
   return motion;
 }
 
-ChannelLimits read_channel_limits(const Section& sensor) {
-  ChannelLimits limits;
-  limits.min = sensor.number("min", any_number, limits.min);
-  limits.max = sensor.number("max", any_number, limits.max);
-  limits.rate_per_s = sensor.number("rate_per_s", above_zero_or_unlimited, limits.rate_per_s);
-  if (!(limits.min < limits.max)) sensor.refuse("min", "must be below max");
-  return limits;
-}
-
 Channel read_channel(const Section& section, const std::string& name) {
   return {.name = name,
           .unit = section.text("unit", "1"),
@@ -223,20 +215,6 @@ Pairs read_responses(const Section& sweep, const std::vector<Channel>& sensors) 
   return pairs;
 }
 
-GuardSettings read_guard(const Section& limits, const MotionLimits& motion, double rate_hz) {
-  GuardSettings guard;
-  guard.command_min = motion.command_min;
-  guard.command_max = motion.command_max;
-  guard.slew_per_s = motion.slew_per_s;
-  const double default_age_s = std::max(0.1, 10.0 / rate_hz);
-  guard.max_age_ns = std::llround(limits.number("age_s", zero_or_more, default_age_s) * 1e9);
-  guard.max_write_faults = static_cast<std::uint32_t>(
-      limits.integer("write_faults", {.min = 0, .max = 1e6}, guard.max_write_faults));
-  guard.stop_ramp_ticks = static_cast<std::uint64_t>(
-      std::llround(limits.number("stop_ramp_s", {.min = 0.0, .max = 60.0}, 0.0) * rate_hz));
-  return guard;
-}
-
 }  // namespace
 
 SweepPlan Rig::plan() const {
@@ -260,6 +238,7 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   Rig rig{.file = nullptr, .actuator = read_channel(file->section("actuator"), "command")};
   for (const Section& section : file->children("sensor")) {
     rig.sensors.push_back(read_channel(section, section.name().substr(sizeof "sensor")));
+    rig.sensors.back().health = section.flag("health", false);
   }
   if (rig.sensors.empty()) {
     throw ConfigError(file->name() + ": there is no sensor; add a section [sensor.NAME]");
@@ -282,9 +261,12 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   }
   rig.sweep.neutral = rig.guard.neutral;
   for (const Channel& sensor : rig.sensors) {
-    rig.guard.channels.push_back(read_channel_limits(sensor.section));
+    rig.guard.channels.push_back(
+        read_channel_limits(sensor.section, rig.rate_hz, sensor.unit == rig.actuator.unit));
   }
   rig.runner.max_gap_s = loop.number("max_gap_s", {.min = 0.001, .max = 3600.0}, 1.0);
+  rig.runner.preflight = read_preflight(sweep);
+  if (const auto retry = file->find("retry")) rig.runner.retry = read_retry(*retry);
   if (const auto output = file->find("output")) {
     rig.runner.record_samples = output->flag("samples", false);
   }

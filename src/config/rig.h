@@ -19,6 +19,7 @@ struct Channel {
   std::string name;
   std::string unit;
   std::string driver;
+  bool health = false;  // of a device: watched by the guard, no response
   Section section;
 };
 

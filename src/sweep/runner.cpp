@@ -141,12 +141,13 @@ void SweepRunner::exchange(double command, const Tick& tick) noexcept {
                               .offset_ns = sample.time_ns - tick_ns,
                               .missing = sample.fault != Fault::none};
   };
+  const bool tripped = guard_.trip().tripped();
   const Sample applied = actuator_.write(command);
   guard_.observe_write(applied, tick.index);
   observe(0, applied);
   command_lost_ = applied.fault != Fault::none && applied.fault != Fault::stale;
   command_late_ = applied.fault == Fault::none && applied_late(observations_[0].offset_ns);
-  if (command_lost_) {
+  if (command_lost_ && !tripped) {
     announce({.kind = EventKind::actuator_fault,
               .fault = applied.fault,
               .dwell = dwell_,

@@ -168,7 +168,7 @@ INSTANTIATE_TEST_SUITE_P(
                "rig.toml:3: [loop] clock = 'virtual': needs every driver to be \"sim\"; hardware "
                "runs on \"monotonic\""},
         Change{"NoSuchOutput", 13, "output = \"z\"",
-               "rig.toml:13: [sensor.y] output = 'z': the plant has no such output; it has \"y\""},
+               "rig.toml:13: [sensor.y] output = 'z': the plant has no such output; it has \"y\" \"error_code\""},
         Change{"JitterOfATick", 13, "jitter_s = 0.001",
                "rig.toml:13: [sensor.y] jitter_s = 0.001: must be at least 0 and below 0.001"},
         Change{"ClipCrossed", 13, "clip_min = 1\nclip_max = 1",

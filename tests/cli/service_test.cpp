@@ -1,0 +1,142 @@
+// What a service manager hears of a run.
+#include <chrono>
+#include <cstdlib>
+#include <poll.h>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include "cli/service_notifier.h"
+#include "support/process.h"
+
+namespace sinerig {
+namespace {
+
+using cli::ServiceNotifier;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::StartsWith;
+
+constexpr int patience_ms = 30'000;
+
+// The manager's end of the socket.
+class Manager {
+ public:
+  explicit Manager(std::string path) : path_{std::move(path)} {
+    descriptor_ = socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    path_.copy(address.sun_path, sizeof address.sun_path - 1);
+    if (path_[0] == '@') address.sun_path[0] = '\0';
+    const auto length = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path_.size());
+    EXPECT_EQ(bind(descriptor_, reinterpret_cast<sockaddr*>(&address), length), 0) << path_;
+  }
+  ~Manager() {
+    close(descriptor_);
+    if (path_[0] != '@') unlink(path_.c_str());
+  }
+  Manager(const Manager&) = delete;
+  Manager& operator=(const Manager&) = delete;
+
+  // The next message; empty where none comes in time.
+  std::string next(int wait_ms = 0) {
+    pollfd waited{.fd = descriptor_, .events = POLLIN, .revents = 0};
+    if (poll(&waited, 1, wait_ms) != 1) return "";
+    char text[512];
+    const ssize_t length = recv(descriptor_, text, sizeof text, 0);
+    return {text, static_cast<std::size_t>(std::max<ssize_t>(length, 0))};
+  }
+  std::vector<std::string> all() {
+    std::vector<std::string> messages;
+    for (std::string text = next(); !text.empty(); text = next()) messages.push_back(text);
+    return messages;
+  }
+
+ private:
+  std::string path_;
+  int descriptor_ = -1;
+};
+
+class Service : public test::ProgramTest {
+ protected:
+  // Short: the path of a socket has room for 107 letters.
+  std::string socket_ = "/tmp/sinerig-notify-" + std::to_string(getpid());
+};
+
+constexpr ServiceNotifier::Time start{};
+
+TEST_F(Service, IsFedByTheLoopsProgressAndNotByTime) {
+  using std::chrono::milliseconds;
+  Manager manager{socket_};
+  ServiceNotifier service{socket_, std::chrono::seconds{1}};
+  service.progress(5, start + milliseconds{1000});
+  EXPECT_THAT(manager.all(), ElementsAre("WATCHDOG=1"));
+  service.progress(6, start + milliseconds{1200});  // within a quarter of the period
+  EXPECT_TRUE(manager.all().empty());
+  service.progress(7, start + milliseconds{1250});
+  EXPECT_THAT(manager.all(), ElementsAre("WATCHDOG=1"));
+  for (int n = 0; n < 100; ++n) service.progress(7, start + milliseconds{2000 + 100 * n});
+  EXPECT_TRUE(manager.all().empty());
+  service.progress(8, start + milliseconds{20'000});
+  EXPECT_THAT(manager.all(), ElementsAre("WATCHDOG=1"));
+}
+
+TEST_F(Service, HearsOfReadinessStatusAndTheEnd) {
+  Manager manager{"@" + socket_};
+  ServiceNotifier service{"@" + socket_, {}};
+  service.ready();
+  service.status("point 1 of 2");
+  service.status("point 1 of 2");
+  service.status("point 2 of 2");
+  service.progress(1, start + std::chrono::hours{1});  // no watchdog was asked for
+  service.stopping();
+  EXPECT_THAT(manager.all(),
+              ElementsAre("READY=1", "STATUS=point 1 of 2", "STATUS=point 2 of 2", "STOPPING=1"));
+}
+
+TEST_F(Service, IsNotMissedWhereThereIsNone) {
+  for (const std::string& nowhere :
+       {std::string{}, std::string{"relative"}, socket_, "/" + std::string(200, 'x')}) {
+    ServiceNotifier service{nowhere, std::chrono::seconds{1}};
+    service.ready();
+    service.progress(1, start + std::chrono::hours{1});
+    service.stopping();
+  }
+}
+
+TEST_F(Service, IsToldWhereARunIsUntilItIsStopped) {
+  write("rig.toml",
+        "[loop]\nrate_hz = 500\nclock = \"monotonic\"\n"
+        "[sweep]\nspacing = \"list\"\nfrequencies_hz = [50, 0.01]\namplitude = 0.5\n"
+        "settling = \"fixed\"\nsettle_cycles = 1\nsettle_s = 0\nintegrate_cycles = 2\n"
+        "integrate_s = 0\ntarget_db = 0\ntarget_deg = 0\n"
+        "[limits]\n[actuator]\n[sensor.y]\n"
+        "[plant]\nkind = \"transfer_function\"\nnum = [60]\nden = [1, 60]\n");
+  Manager manager{socket_};
+  setenv("NOTIFY_SOCKET", socket_.c_str(), 1);
+  setenv("WATCHDOG_USEC", "200000", 1);
+  test::Program program{{"run", "rig.toml", "--no-report"}, folder_};
+  unsetenv("NOTIFY_SOCKET");
+  unsetenv("WATCHDOG_USEC");
+
+  EXPECT_EQ(manager.next(patience_ms), "READY=1");
+  std::string last_status;
+  for (int meals = 0; meals < 4;) {
+    const std::string message = manager.next(patience_ms);
+    ASSERT_FALSE(message.empty());
+    if (message.rfind("STATUS=", 0) == 0) last_status = message;
+    if (message == "WATCHDOG=1") ++meals;
+  }
+  EXPECT_THAT(last_status, StartsWith("STATUS=point "));
+  EXPECT_THAT(last_status, HasSubstr(" of 2, "));
+  EXPECT_THAT(last_status, HasSubstr(" left"));
+  program.send(SIGTERM);
+  EXPECT_EQ(program.finish().code, 4);
+  EXPECT_EQ(manager.all().back(), "STOPPING=1\nWATCHDOG=1");
+}
+
+}  // namespace
+}  // namespace sinerig
