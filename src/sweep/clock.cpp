@@ -1,5 +1,6 @@
 #include "sweep/clock.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <ctime>
@@ -11,10 +12,17 @@ namespace {
 
 constexpr std::int64_t ns_per_s = 1'000'000'000;
 
-std::int64_t monotonic_ns() noexcept {
+// Shorter than any suspension, longer than two readings of one clock differ by.
+constexpr std::int64_t least_suspension_ns = 10'000'000;
+
+std::int64_t read_ns(clockid_t clock) noexcept {
   timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
+  clock_gettime(clock, &now);
   return static_cast<std::int64_t>(now.tv_sec) * ns_per_s + now.tv_nsec;
+}
+
+std::int64_t monotonic_ns() noexcept {
+  return read_ns(CLOCK_MONOTONIC);
 }
 
 void sleep_until(std::int64_t time_ns) noexcept {
@@ -62,16 +70,33 @@ std::int64_t VirtualClock::time_ns(Instant instant) const noexcept {
 
 Tick MonotonicClock::wait() noexcept {
   if (origin_ns_ == 0) {
-    origin_ns_ = monotonic_ns();
+    constexpr int readings = 3;
+    for (int n = 0; n < readings; ++n) {
+      const std::int64_t boot_ns = read_ns(CLOCK_BOOTTIME);
+      origin_ns_ = monotonic_ns();
+      asleep_ns_ = std::max(asleep_ns_, boot_ns - origin_ns_);
+    }
     return {};
   }
   std::uint64_t index = last_ + 1;
   const std::int64_t deadline_ns = origin_ns_ + grid().time_ns(index);
   if (monotonic_ns() < deadline_ns) sleep_until(deadline_ns);
-  const std::int64_t elapsed_ns = monotonic_ns() - origin_ns_;
+  const std::int64_t boot_ns = read_ns(CLOCK_BOOTTIME);
+  const std::int64_t now_ns = monotonic_ns();
+  note_suspension(boot_ns - now_ns);
+  const std::int64_t elapsed_ns = now_ns - origin_ns_;
   if (elapsed_ns >= grid().time_ns(index + 1)) index = grid().index_at(elapsed_ns);
   last_ = index;
   return {.index = index, .lateness = std::chrono::nanoseconds{elapsed_ns - grid().time_ns(index)}};
+}
+
+// CLOCK_MONOTONIC stands still while the machine sleeps, the mechanism does not: the time asleep
+// becomes a gap. CLOCK_BOOTTIME is read first, so that an interruption between the two readings
+// makes the sum smaller, never larger.
+void MonotonicClock::note_suspension(std::int64_t asleep_ns) noexcept {
+  const std::int64_t slept_ns = asleep_ns - asleep_ns_;
+  if (slept_ns > least_suspension_ns) origin_ns_ -= slept_ns;
+  asleep_ns_ = std::max(asleep_ns_, asleep_ns);
 }
 
 Instant MonotonicClock::now() const noexcept {

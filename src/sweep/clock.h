@@ -85,7 +85,8 @@ class VirtualClock final : public Clock {
   std::uint64_t next_ = 0;
 };
 
-// CLOCK_MONOTONIC with absolute deadlines.
+// CLOCK_MONOTONIC with absolute deadlines. Steps of the wall clock do not matter; a suspension of
+// the machine is a gap of its whole length.
 class MonotonicClock final : public Clock {
  public:
   using Clock::Clock;
@@ -94,7 +95,10 @@ class MonotonicClock final : public Clock {
   std::int64_t time_ns(Instant instant) const noexcept SINERIG_NONBLOCKING override;
 
  private:
+  void note_suspension(std::int64_t asleep_ns) noexcept SINERIG_NONBLOCKING;
+
   std::int64_t origin_ns_ = 0;  // CLOCK_MONOTONIC at tick 0; 0 before the first wait
+  std::int64_t asleep_ns_ = 0;  // CLOCK_BOOTTIME − CLOCK_MONOTONIC, the largest seen
   std::uint64_t last_ = 0;
 };
 
