@@ -5,6 +5,7 @@
 #include <cstdarg>
 #include <numbers>
 #include <ostream>
+#include <utility>
 
 namespace sinerig::report {
 
@@ -197,8 +198,11 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
       stream << '\n';
     }
   }
+  bool first = true;
   for (const record::StoredEvent& event : run.events) {
-    if (!event.detail.empty()) stream << "\n" << event.kind << ": " << event.detail << '\n';
+    if (event.detail.empty()) continue;
+    if (std::exchange(first, false)) stream << '\n';
+    stream << event.kind << ": " << event.detail << '\n';
   }
 }
 

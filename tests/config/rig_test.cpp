@@ -55,6 +55,35 @@ std::string text_with(std::size_t line, const std::string& replacement) {
   return text.str();
 }
 
+TEST(ARig, HandsItsLimitsToTheGuard) {
+  const Rig rig = read_rig(RigFile::parse(
+      "[loop]\nrate_hz = 1000\n[sweep]\nstart_hz = 1\nstop_hz = 9\npoints = 3\namplitude = 1\n"
+      "preflight = true\npreflight_gain = [0.5, 2]\n[limits]\nage_s = 0.2\nlateness_s = 0.003\n"
+      "[actuator]\nunit = \"rad\"\n[sensor.y]\nunit = \"rad\"\nsoft_max = 2\nvelocity_max = 5\n"
+      "soft_acceleration_max = 70\nfollowing_max = 0.1\nfollowing_s = 0.05\nallowed = [0, 8]\n"
+      "age_s = 3\nhealth = true\n[sensor.z]\n[retry]\nfaults = 4\nsoft_factor = 0.25\n",
+      "rig.toml"));
+  const ChannelLimits& y = rig.guard.channels[0];
+  EXPECT_EQ(y.soft_max, 2.0);
+  EXPECT_EQ(y.velocity.hard, 5.0);
+  EXPECT_EQ(y.velocity.soft, unlimited);
+  EXPECT_EQ(y.acceleration.soft, 70.0);
+  EXPECT_DOUBLE_EQ(y.derivative_filter_s, 0.004);
+  EXPECT_EQ(y.following.hard, 0.1);
+  EXPECT_EQ(y.following_ns, 50'000'000);
+  EXPECT_EQ(y.allowed, (std::vector<double>{0.0, 8.0}));
+  EXPECT_EQ(y.max_age_ns, 3'000'000'000);
+  EXPECT_TRUE(y.watched_closely());
+  EXPECT_FALSE(rig.guard.channels[1].watched_closely());
+  EXPECT_EQ(rig.guard.max_age_ns, 200'000'000);
+  EXPECT_EQ(rig.guard.max_lateness_ns, 3'000'000);
+  EXPECT_TRUE(rig.sensors[0].health);
+  EXPECT_TRUE(rig.runner.preflight.wanted);
+  EXPECT_EQ(rig.runner.preflight.max_gain, 2.0);
+  EXPECT_EQ(rig.runner.retry.faults, 4U);
+  EXPECT_EQ(rig.runner.retry.soft_factor, 0.25);
+}
+
 TEST(ARig, IsReadCheckedAndPlanned) {
   EXPECT_EQ(refusal_of(text_with(0, ""), "rig.toml"), "");
 }
@@ -136,6 +165,37 @@ INSTANTIATE_TEST_SUITE_P(
         Change{"ToleranceTooWide", 7, "amplitude = 0.5\nfrequency_tolerance = 0.2",
                "rig.toml:8: [sweep] frequency_tolerance = 0.2: must be at least 1e-09 and at most "
                "0.1"},
+        Change{"SoftLimitBeyondTheHardOne", 13, "max = 1\nsoft_max = 2",
+               "rig.toml:14: [sensor.y] soft_max = 2: must be below max, which stops the sweep "
+               "before it"},
+        Change{"SoftWindowBelowTheHardOne", 13, "min = -1\nsoft_min = -1",
+               "rig.toml:14: [sensor.y] soft_min = -1: must be above min, which stops the sweep "
+               "before it"},
+        Change{"SoftVelocityBeyondTheHardOne", 13, "velocity_max = 1\nsoft_velocity_max = 1",
+               "rig.toml:14: [sensor.y] soft_velocity_max = 1: must be below velocity_max, which "
+               "stops the sweep before it"},
+        Change{"AccelerationAtZero", 13, "acceleration_max = 0",
+               "rig.toml:13: [sensor.y] acceleration_max = 0: must be above 0"},
+        Change{"FollowingInAnotherUnit", 13, "unit = \"rad\"\nfollowing_max = 0.1",
+               "rig.toml:14: [sensor.y] following_max = 0.1: needs a sensor in the unit of the "
+               "command; give it the `unit` of [actuator]"},
+        Change{"NoAllowedValue", 13, "allowed = []",
+               "rig.toml:13: [sensor.y] allowed = []: must hold at least one value"},
+        Change{"LatenessAtZero", 9, "lateness_s = 0",
+               "rig.toml:9: [limits] lateness_s = 0: must be above 0"},
+        Change{"PreflightAboveTheSweep", 7, "amplitude = 0.5\npreflight_level = 2",
+               "rig.toml:8: [sweep] preflight_level = 2: must be above 0 and at most 1"},
+        Change{"PreflightGainUpsideDown", 7, "amplitude = 0.5\npreflight_gain = [2, 1]",
+               "rig.toml:8: [sweep] preflight_gain = [2, 1]: must be [smallest, largest]"},
+        Change{"PreflightPhaseBeyondATurn", 7, "amplitude = 0.5\npreflight_phase_deg = [-200, 200]",
+               "rig.toml:8: [sweep] preflight_phase_deg = [-200, 200]: must span a whole turn at "
+               "most"},
+        Change{"RetryLouder", 18, "[retry]\nsoft_factor = 1.5\n[output]",
+               "rig.toml:19: [retry] soft_factor = 1.5: must be at least 0.01 and at most 1"},
+        Change{"TripsInDisorder", 11, "trips_at_s = [3, 1]",
+               "rig.toml:11: [actuator] trips_at_s = [3, 1]: must ascend"},
+        Change{"LossWithoutAnEnd", 11, "connection_lost_s = [[3]]",
+               "rig.toml:11: [actuator] connection_lost_s = [[3]]: every row is [from, to]"},
         Change{"BlockBelowACycle", 7, "amplitude = 0.5\nblock_cycles = 0.5",
                "rig.toml:8: [sweep] block_cycles = 0.5: must be at least 1"},
         Change{"AmplitudeAboveTheCommand", 7, "amplitude = 1.5",
@@ -168,7 +228,8 @@ INSTANTIATE_TEST_SUITE_P(
                "rig.toml:3: [loop] clock = 'virtual': needs every driver to be \"sim\"; hardware "
                "runs on \"monotonic\""},
         Change{"NoSuchOutput", 13, "output = \"z\"",
-               "rig.toml:13: [sensor.y] output = 'z': the plant has no such output; it has \"y\" \"error_code\""},
+               "rig.toml:13: [sensor.y] output = 'z': the plant has no such output; it has \"y\" "
+               "\"error_code\""},
         Change{"JitterOfATick", 13, "jitter_s = 0.001",
                "rig.toml:13: [sensor.y] jitter_s = 0.001: must be at least 0 and below 0.001"},
         Change{"ClipCrossed", 13, "clip_min = 1\nclip_max = 1",

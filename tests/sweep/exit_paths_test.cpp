@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "support/guarded_bench.h"
+#include "sweep/outbox.h"
 
 namespace sinerig {
 namespace {
@@ -137,6 +138,51 @@ TEST(LastTick, WithAFailedRecorderIsReportedAndReleases) {
   EXPECT_EQ(outcome.trip.cause, TripCause::recorder_stalled);
   EXPECT_TRUE(bench.actuator.released);
   EXPECT_EQ(bench.actuator.last, GuardedBench::neutral);
+}
+
+// Nobody takes anything out of the queue until the loop has ended.
+TEST(AFullQueue, StopsTheSweepAndLosesNoPointOrEvent) {
+  GuardedBench bench;
+  SweepSettings sweep;
+  sweep.start_hz = 20.0;
+  sweep.stop_hz = 100.0;
+  sweep.points = 200;
+  sweep.frequency_tolerance = 1e-6;
+  sweep.amplitude = 0.1;
+  bench.plan = plan_sweep(sweep, {}, GuardedBench::rate_hz);
+  bench.settings.neutral = 0.0;
+  bench.settings.stop_ramp_ticks = 8;
+  Outbox outbox{64, 256, Outbox::WhenFull::keep};
+  Guard guard{bench.settings, 1.0 / GuardedBench::rate_hz};
+  Sensor* const sensors[] = {&bench.sensor};
+  SweepRunner runner{
+      bench.plan, {.record_samples = true}, bench.clock, bench.actuator, sensors, guard, outbox};
+  const RunOutcome outcome = runner.run(bench.control);
+  EXPECT_EQ(outcome.trip.cause, TripCause::recorder_stalled);
+  EXPECT_TRUE(bench.actuator.released);
+  EXPECT_GT(outbox.dropped_samples(), 0U);
+
+  test::CollectingSink taken;
+  Record record;
+  for (bool more = true; more;) {
+    more = false;
+    while (outbox.try_take(record)) {
+      more = true;
+      if (const auto* samples = std::get_if<TickSamples>(&record)) {
+        taken.put_sample(*samples);
+      } else {
+        taken.put(record);
+      }
+    }
+    outbox.flush();
+  }
+  EXPECT_EQ(taken.points.size(), outcome.dwells_done + 1U);
+  EXPECT_EQ(taken.timings.size(), taken.points.size());
+  EXPECT_EQ(taken.points.back().status, PointStatus::stopped);
+  const auto& events = taken.events;
+  EXPECT_EQ(events.back().kind, EventKind::finished);
+  EXPECT_EQ(events[events.size() - 3].trip.cause, TripCause::recorder_stalled);
+  EXPECT_EQ(taken.samples.size() + outbox.dropped_samples(), outcome.ticks);
 }
 
 TEST(AStoppedDwell, KeepsTheBlocksThatItHadFinished) {
