@@ -54,4 +54,8 @@ for transport in tcp rtu; do
 done
 sweep_with tcp 'power_cycle_at_s = 2.0' 3 'connection lost'
 sweep_with rtu 'power_cycle_at_s = 2.0' 3 'no answer in time'
+# Armed again, the same power cut costs a repeated point; an error that stays, five tries.
+printf '\n[retry]\nfaults = 5\nwait_s = 1\n' >>"$out/tcp.toml"
+sweep_with tcp 'power_cycle_at_s = 2.0' 0 'device_fault: 127.0.0.1:5020: connection lost'
+sweep_with tcp 'error_at_s = 2.0' 3 '(5 tries to arm again are spent, [retry])'
 exit $failed
