@@ -54,6 +54,15 @@ std::string lengths(const Dwell& dwell, double rate_hz) {
 
 }  // namespace
 
+std::string usage_text(const ThreadUsage& usage) {
+  const std::uint64_t faults = usage.minor_faults + usage.major_faults;
+  const std::uint64_t switches = usage.involuntary_switches;
+  std::string words = std::to_string(faults) + (faults == 1 ? " page fault" : " page faults");
+  if (usage.major_faults > 0) words += " (" + std::to_string(usage.major_faults) + " from a disk)";
+  return words + ", " + std::to_string(switches) +
+         (switches == 1 ? " involuntary switch" : " involuntary switches");
+}
+
 std::string duration_text(double seconds) {
   const auto whole = static_cast<long>(std::llround(seconds));
   if (whole < 3600) return text("%ld:%02ld", whole / 60, whole % 60);
@@ -168,9 +177,11 @@ void print_head(std::ostream& stream, const record::StoredRun& run) {
     skipped += timing.skipped;
     max_lateness_ns = std::max(max_lateness_ns, timing.max_lateness_ns);
   }
-  stream << text("loop     %llu ticks, %llu skipped, %.1f µs late at most\n",
+  stream << text("loop     %llu ticks, %llu skipped, %.1f µs late at most",
                  static_cast<unsigned long long>(ticks), static_cast<unsigned long long>(skipped),
                  static_cast<double>(max_lateness_ns) * 1e-3);
+  if (const auto usage = run.usage()) stream << ", " << usage_text(*usage);
+  stream << '\n';
 }
 
 }  // namespace

@@ -5,6 +5,8 @@
 #include <ctime>
 #include <stdexcept>
 
+#include <sys/resource.h>
+
 namespace sinerig {
 
 namespace {
@@ -81,6 +83,14 @@ Instant MonotonicClock::now() const noexcept {
 
 std::int64_t MonotonicClock::time_ns(Instant instant) const noexcept {
   return origin_ns_ + grid().time_ns(instant.tick) + instant.offset_ns;
+}
+
+std::optional<ThreadUsage> MonotonicClock::usage() const noexcept {
+  rusage usage{};
+  if (getrusage(RUSAGE_THREAD, &usage) != 0) return {};
+  return ThreadUsage{.minor_faults = static_cast<std::uint64_t>(usage.ru_minflt),
+                     .major_faults = static_cast<std::uint64_t>(usage.ru_majflt),
+                     .involuntary_switches = static_cast<std::uint64_t>(usage.ru_nivcsw)};
 }
 
 }  // namespace sinerig

@@ -93,6 +93,7 @@ RunOutcome SweepRunner::run(RunControl& control) noexcept {
   {
     const ReleaseOnExit release{actuator_};
     announce({.kind = EventKind::started});
+    usage_ = clock_.usage();
     while (step(control)) {
     }
   }
@@ -346,9 +347,18 @@ void SweepRunner::finish_dwell() noexcept {
     }
     if (refining) refiner_.learn();
   }
+  account_usage();
   sink_.put(timing_);
   outcome_.skipped_ticks += timing_.skipped;
   dwell_ticks_ = 0;
+}
+
+// The loop's one system call of its own besides the sleep: once a dwell, in its last tick, when the
+// command is out and every sensor has been read. It never waits.
+void SweepRunner::account_usage() noexcept {
+  const std::optional<ThreadUsage> now = clock_.usage();
+  if (now && usage_) timing_.usage = *now - *usage_;
+  usage_ = now;
 }
 
 Point SweepRunner::make_point(std::size_t pair, std::size_t tone) const noexcept {

@@ -63,6 +63,7 @@ class SweepRunner {
   void check_excitation(std::uint64_t tick) noexcept;
   bool try_again() noexcept;
   void finish_dwell() noexcept;
+  void account_usage() noexcept SINERIG_NONBLOCKING;
   void refine() noexcept;
   Point make_point(std::size_t pair, std::size_t tone) const noexcept;
   void account(const Tick& tick, std::uint64_t ticks) noexcept;
@@ -99,6 +100,7 @@ class SweepRunner {
   bool applied_known_ = false;
   std::int64_t applied_offset_ns_ = 0;  // of the last command from its tick
   DwellTiming timing_;
+  std::optional<ThreadUsage> usage_;  // of the loop's thread, at the end of the dwell before
   std::uint64_t last_tick_ = 0;
   RunOutcome outcome_;
 };

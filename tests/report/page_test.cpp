@@ -80,7 +80,7 @@ LabelledRun run_of(std::size_t points) {
 TEST_F(Page, DrawsEveryPlotWithoutAnError) {
   show(run_of(40));
   for (const char* id : {"gain", "phase", "nyquist", "gain95", "phase95", "snr", "amplitude",
-                         "response", "lateness", "histogram"}) {
+                         "response", "lateness", "histogram", "faults", "switches"}) {
     const std::string inside = "!!document.querySelector('#" + std::string{id} + " svg path')";
     EXPECT_TRUE(browser_->evaluate(inside).get<bool>()) << id;
   }
@@ -212,8 +212,8 @@ TEST_F(Page, ShowsTheLoopWithItsMarginsAndTheNotch) {
   EXPECT_EQ(browser_->evaluate("document.querySelectorAll('#loop-gain .curve').length"), 2);
   const auto cell = [&](int row, int column) {
     return browser_
-        ->evaluate("document.querySelector('#margins table tbody').rows[" +
-                   std::to_string(row) + "].cells[" + std::to_string(column) + "].textContent")
+        ->evaluate("document.querySelector('#margins table tbody').rows[" + std::to_string(row) +
+                   "].cells[" + std::to_string(column) + "].textContent")
         .get<std::string>();
   };
   // Gain margin of the model, 15.0 dB, and with the notch, more of it.
