@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
 #include "cli/live_view.h"
+#include "cli/real_time.h"
 #include "cli/report_file.h"
 #include "cli/run_teller.h"
 #include "cli/stop_on_signal.h"
@@ -75,10 +76,26 @@ struct Audience {
   record::Recorder::Samples samples;
 };
 
+// Whatever happens to those who watch: the loop ends, neutral, before what it works on is gone.
+class EndOfLoop {
+ public:
+  EndOfLoop(realtime::LoopThread& loop, RunControl& control) : loop_{loop}, control_{control} {}
+  ~EndOfLoop() {
+    control_.stop_requests.store(2);
+    loop_.join();
+  }
+  EndOfLoop(const EndOfLoop&) = delete;
+  EndOfLoop& operator=(const EndOfLoop&) = delete;
+
+ private:
+  realtime::LoopThread& loop_;
+  RunControl& control_;
+};
+
 // The loop on its own thread, its story told on this one, until both the loop and the recorder are
 // done.
-RunOutcome play(SweepRunner& runner, RunControl& control, Outbox& outbox,
-                record::SweepWriter& writer, const Audience& audience) {
+RunOutcome play(realtime::LoopThread& loop, SweepRunner& runner, RunControl& control,
+                Outbox& outbox, record::SweepWriter& writer, const Audience& audience) {
   PointInbox inbox;
   const auto observe = [&](const Record& record) {
     inbox.put(record);
@@ -87,12 +104,12 @@ RunOutcome play(SweepRunner& runner, RunControl& control, Outbox& outbox,
   record::Recorder recorder{outbox, writer, observe, audience.samples};
   RunOutcome outcome;
   std::atomic<bool> done{false};
-  std::thread loop{[&] {
-    outcome = runner.run(control);
-    outbox.close();
-    done.store(true);
-    done.notify_one();
-  }};
+  loop.start([&] { outcome = runner.run(control); },
+             [&] {
+               outbox.close();
+               done.store(true);
+             });
+  const EndOfLoop end_of_loop{loop, control};
   const auto tell = [&] {
     for (const Point& point : inbox.take()) audience.teller.point(point);
     audience.teller.update(control.dwell.load(), control.tick.load());
@@ -147,6 +164,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const config::Rig& rig = configured.rig();
   const SweepPlan plan = rig.plan();
   Clock& clock = configured.clock();
+  const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   RunControl control;
   const StopOnSignal stop_on_signal{control};
   const std::string path =
@@ -160,6 +178,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   record::SweepWriter writer{path, run_info(rig, plan),
                              options.force ? record::SweepWriter::IfExists::replace
                                            : record::SweepWriter::IfExists::refuse};
+  record_grants(writer, loop->grants());
   const bool in_real_time = rig.clock == config::ClockKind::monotonic;
   Outbox outbox{outbox_slots, outbox_backlog,
                 in_real_time ? Outbox::WhenFull::keep : Outbox::WhenFull::wait};
@@ -177,7 +196,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
       plan,  settings, view ? view->clock() : clock, configured.actuator(), configured.sensors(),
       guard, outbox};
   const bool keep_samples = rig.runner.record_samples || !view;
-  const RunOutcome outcome = play(runner, control, outbox, writer,
+  const RunOutcome outcome = play(*loop, runner, control, outbox, writer,
                                   {.teller = teller,
                                    .view = view.get(),
                                    .samples = keep_samples ? record::Recorder::Samples::written
