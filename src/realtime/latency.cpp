@@ -39,15 +39,22 @@ double LatencyHistogram::quantile_us(double part) const noexcept {
   return 0.0;
 }
 
-WakeUps measure_wake_ups(LoopThread& thread, double rate_hz, std::uint64_t wake_ups,
-                         const std::atomic<bool>& stop) {
+std::vector<std::pair<std::size_t, std::uint64_t>> LatencyHistogram::filled_bins() const {
+  std::vector<std::pair<std::size_t, std::uint64_t>> filled;
+  for (std::size_t i = 0; i < bins; ++i) {
+    if (counts_[i] > 0) filled.emplace_back(i, counts_[i]);
+  }
+  return filled;
+}
+
+WakeUps measure_wake_ups(LoopThread& thread, double rate_hz, std::uint64_t wake_ups) {
   WakeUps result;
   MonotonicClock clock{TickGrid{rate_hz}};
   const auto loop = [&]() noexcept {
     clock.wait();
     const ThreadUsage before = clock.usage().value_or(ThreadUsage{});
     std::uint64_t last = 0;
-    for (std::uint64_t i = 0; i < wake_ups && !stop.load(std::memory_order_relaxed); ++i) {
+    for (std::uint64_t i = 0; i < wake_ups; ++i) {
       const Tick tick = clock.wait();
       result.latency.add(tick.lateness.count());
       result.skipped += tick.index - last - 1;

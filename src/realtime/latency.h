@@ -2,8 +2,9 @@
 // grid, read the clock, subtract.
 #pragma once
 
-#include <atomic>
+#include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "realtime/loop_thread.h"
@@ -30,6 +31,9 @@ class LatencyHistogram {
   void add_bin(std::size_t microseconds, std::uint64_t count) noexcept;
   void merge(const LatencyHistogram& other) noexcept;
 
+  // Microseconds and count of each bin that holds something, rising.
+  std::vector<std::pair<std::size_t, std::uint64_t>> filled_bins() const;
+
  private:
   static constexpr std::size_t bins = 100'000;  // the last one holds all that is longer
 
@@ -45,8 +49,7 @@ struct WakeUps {
 };
 
 // Starts the thread with the loop's own clock at `rate_hz` (bounds of TickGrid), waits until it has
-// woken `wake_ups` times or `stop` is set. `thread` has not been started yet.
-WakeUps measure_wake_ups(LoopThread& thread, double rate_hz, std::uint64_t wake_ups,
-                         const std::atomic<bool>& stop);
+// woken `wake_ups` times. `thread` has not been started yet.
+WakeUps measure_wake_ups(LoopThread& thread, double rate_hz, std::uint64_t wake_ups);
 
 }  // namespace sinerig::realtime

@@ -155,6 +155,25 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
 
 namespace {
 
+// What the loop's thread had of the real-time rights that it asked for.
+void print_rights(std::ostream& stream, const record::StoredRun& run) {
+  const std::string prefix = "realtime_";
+  const std::string mark = "missing: ";
+  std::string missing;
+  bool asked = false;
+  for (const auto& [key, value] : run.facts) {
+    if (!key.starts_with(prefix)) continue;
+    asked = true;
+    if (value.starts_with(mark))
+      missing += (missing.empty() ? "" : ", ") + key.substr(prefix.size());
+  }
+  if (!asked) return;
+  if (missing.empty())
+    stream << "rights   " << run.fact("realtime_scheduling") << ", and all others asked for\n";
+  else
+    stream << "rights   without " << missing << '\n';
+}
+
 // Which run it is and how it went.
 void print_head(std::ostream& stream, const record::StoredRun& run) {
   if (!run.fact("imported_from").empty()) {
@@ -182,6 +201,7 @@ void print_head(std::ostream& stream, const record::StoredRun& run) {
                  static_cast<double>(max_lateness_ns) * 1e-3);
   if (const auto usage = run.usage()) stream << ", " << usage_text(*usage);
   stream << '\n';
+  print_rights(stream, run);
 }
 
 }  // namespace
