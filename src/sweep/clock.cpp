@@ -20,6 +20,7 @@ std::int64_t monotonic_ns() noexcept {
 }
 
 void sleep_until(std::int64_t time_ns) noexcept {
+  const SystemCall waits_by_design;
   const timespec deadline{.tv_sec = time_ns / ns_per_s, .tv_nsec = time_ns % ns_per_s};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
   }
@@ -87,6 +88,7 @@ std::int64_t MonotonicClock::time_ns(Instant instant) const noexcept {
 
 std::optional<ThreadUsage> MonotonicClock::usage() const noexcept {
   rusage usage{};
+  const SystemCall reads_counters;
   if (getrusage(RUSAGE_THREAD, &usage) != 0) return {};
   return ThreadUsage{.minor_faults = static_cast<std::uint64_t>(usage.ru_minflt),
                      .major_faults = static_cast<std::uint64_t>(usage.ru_majflt),
