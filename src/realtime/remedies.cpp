@@ -70,10 +70,16 @@ std::string allow_locked_memory(const Starter& starter) {
 }
 
 std::string allow_cpu_latency(const Starter& starter) {
-  if (starter.kind == Starter::Kind::container)
-    return "start the container with --device /dev/cpu_dma_latency";
-  return "echo 'KERNEL==\"cpu_dma_latency\", MODE=\"0666\"' | sudo tee "
-         "/etc/udev/rules.d/90-sinerig.rules && sudo udevadm trigger /dev/cpu_dma_latency";
+  switch (starter.kind) {
+    case Starter::Kind::service:
+      return unit_line(starter, "ExecStartPre=+/bin/chmod 0666 /dev/cpu_dma_latency");
+    case Starter::Kind::container: return "start the container with --device /dev/cpu_dma_latency";
+    case Starter::Kind::person:
+      return "echo 'KERNEL==\"cpu_dma_latency\", OWNER=\"" + starter.name +
+             "\"' | sudo tee /etc/udev/rules.d/90-sinerig.rules, then sudo udevadm trigger "
+             "/dev/cpu_dma_latency";
+  }
+  return {};
 }
 
 std::string program_path() {

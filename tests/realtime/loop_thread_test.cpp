@@ -160,12 +160,16 @@ TEST(Remedies, DependOnWhoStartedTheProgram) {
   EXPECT_EQ(allow_locked_memory(person),
             "echo 'ada - memlock unlimited' | sudo tee -a /etc/security/limits.d/90-sinerig.conf, "
             "then log in again");
-  EXPECT_THAT(allow_cpu_latency(person), HasSubstr("/etc/udev/rules.d/90-sinerig.rules"));
+  EXPECT_EQ(allow_cpu_latency(person),
+            "echo 'KERNEL==\"cpu_dma_latency\", OWNER=\"ada\"' | sudo tee "
+            "/etc/udev/rules.d/90-sinerig.rules, then sudo udevadm trigger /dev/cpu_dma_latency");
   const Starter service{.kind = Starter::Kind::service, .name = "sinerig@gimbal.service"};
   EXPECT_EQ(allow_priority(service),
             "sudo systemctl edit sinerig@gimbal.service: under [Service] LimitRTPRIO=99");
   EXPECT_EQ(allow_locked_memory(service),
             "sudo systemctl edit sinerig@gimbal.service: under [Service] LimitMEMLOCK=infinity");
+  EXPECT_THAT(allow_cpu_latency(service),
+              HasSubstr("ExecStartPre=+/bin/chmod 0666 /dev/cpu_dma_latency"));
   const Starter container{.kind = Starter::Kind::container, .name = "root"};
   EXPECT_EQ(allow_priority(container),
             "start the container with --cap-add SYS_NICE --ulimit rtprio=99");

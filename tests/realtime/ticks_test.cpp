@@ -1,7 +1,6 @@
 // What a tick asks of the kernel in real time, for the drivers that need no bus: the sleep, and
 // what the driver itself has to. Under the preset `rtsan` the real-time sanitizer watches the same
 // runs.
-#include <mutex>
 #include <unistd.h>
 
 #include <gmock/gmock.h>
@@ -20,18 +19,13 @@
 namespace sinerig {
 namespace {
 
-using testing::_;
-using testing::AllOf;
 using testing::Contains;
-using testing::Ge;
 using testing::Gt;
-using testing::Key;
-using testing::Le;
 using testing::Pair;
 using testing::UnorderedElementsAre;
 
 // A tick that comes too late does not sleep.
-constexpr std::uint64_t least_ticks = 200;
+constexpr std::uint64_t least_ticks = 100;
 
 sim::SimulatedRigSettings simulated_axis() {
   sim::SimulatedRigSettings settings;
@@ -47,10 +41,10 @@ TEST(SystemCalls, OfTheLoopAreTheSleepAndOneLookAtItselfPerDwell) {
     return test::exit_code_of(test::run_in_real_time(clock, rig.actuator(), {&rig.sensor(0)}));
   });
   EXPECT_EQ(traced.exit_code, 0);
-#ifndef SINERIG_UNDER_RTSAN
-  EXPECT_THAT(traced.calls, UnorderedElementsAre(Pair("clock_nanosleep", Gt(least_ticks)),
-                                                 Pair("getrusage", 2U)));
-#endif
+  if (test::loop_is_traced) {
+    EXPECT_THAT(traced.calls, UnorderedElementsAre(Pair("clock_nanosleep", Gt(least_ticks)),
+                                                   Pair("getrusage", 2U)));
+  }
 }
 
 #ifndef SINERIG_UNDER_RTSAN
@@ -148,12 +142,12 @@ int run_over_modbus() {
 
 TEST(SystemCalls, OfAModbusTickAreTheSleepAndTheWakingOfItsThread) {
   const auto traced = test::trace_loop(run_over_modbus);
-  EXPECT_THAT(traced.exit_code, testing::AnyOf(0, 3));
-#ifndef SINERIG_UNDER_RTSAN
-  EXPECT_THAT(traced.calls,
-              UnorderedElementsAre(Pair("clock_nanosleep", Gt(least_ticks)), Pair("getrusage", 2U),
-                                   Pair("write", Gt(least_ticks))));
-#endif
+  EXPECT_EQ(traced.exit_code, 0);
+  if (test::loop_is_traced) {
+    EXPECT_THAT(traced.calls,
+                UnorderedElementsAre(Pair("clock_nanosleep", Gt(least_ticks)),
+                                     Pair("getrusage", 2U), Pair("write", Gt(least_ticks))));
+  }
 }
 #endif
 
