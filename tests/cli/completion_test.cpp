@@ -33,6 +33,9 @@ TEST_F(Completion, BashOffersCommandsOptionsValuesAndFiles) {
   workshop_.write("gimbal.sweep", "");
   workshop_.write("gimbal.txt.orig", "");
   EXPECT_EQ(offered("sinerig run gim", 2), "gimbal.toml\n");
+  EXPECT_EQ(offered("sinerig doc", 1), "doctor\n");
+  EXPECT_EQ(offered("sinerig doctor --str", 2), "--strict\n");
+  EXPECT_EQ(offered("sinerig doctor gim", 2), "gimbal.toml\n");
   EXPECT_EQ(offered("sinerig report gim", 2), "gimbal.sweep\n");
 }
 

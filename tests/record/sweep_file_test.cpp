@@ -141,6 +141,22 @@ TEST_F(SweepFile, IsReadBackAsItWasWritten) {
   EXPECT_THAT(run.events[1].detail, HasSubstr("gyro = 3 is outside its limit 2"));
 }
 
+TEST_F(SweepFile, FromBeforeTheThreadsUsageWasKeptIsReadWithoutIt) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.write(DwellTiming{.dwell = 0, .ticks = 100, .usage = ThreadUsage{.minor_faults = 5}});
+    writer.finish();
+  }
+  EXPECT_TRUE(read_sweep(path()).usage());
+  execute(path(),
+          "ALTER TABLE timing DROP COLUMN minor_faults; ALTER TABLE timing DROP COLUMN "
+          "major_faults; ALTER TABLE timing DROP COLUMN involuntary_switches");
+  const StoredRun run = read_sweep(path());
+  ASSERT_EQ(run.timings.size(), 1U);
+  EXPECT_EQ(run.timings[0].ticks, 100U);
+  EXPECT_EQ(run.usage(), std::nullopt);
+}
+
 TEST_F(SweepFile, IsOnePlainFileOnceItIsFinished) {
   write_and_finish(path());
   EXPECT_TRUE(fs::exists(path()));
