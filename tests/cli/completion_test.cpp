@@ -55,8 +55,9 @@ TEST_F(Completion, ZshAndFishTakeTheirScripts) {
 TEST_F(Completion, ManualHoldsEveryCommandAndIsGoodRoff) {
   const std::string page = workshop_.sinerig("manual").output;
   workshop_.write("sinerig.1", page);
-  EXPECT_THAT(page, AllOf(HasSubstr(".SS \"notch FILE... [OPTION...]\""), HasSubstr("\\-\\-serve"),
-                          HasSubstr(".SH EXIT STATUS")));
+  EXPECT_THAT(page,
+              AllOf(HasSubstr(".SS \"notch FILE... [OPTION...]\""), HasSubstr("\\-\\-serve"),
+                    HasSubstr(".SS \"doctor [RIG] [OPTION...]\""), HasSubstr(".SH EXIT STATUS")));
   if (!here("groff")) GTEST_SKIP() << "no groff here to read the page (Debian: apt install groff)";
   const auto read = workshop_.shell("groff -man -Tutf8 -ww sinerig.1");
   EXPECT_EQ(read.errors, "");
