@@ -50,10 +50,11 @@ record::StoredRun record_run(realtime::LoopThread& thread, Clock& clock, Outbox:
     Sensor* const sensors[] = {&rig.sensor(0)};
     Guard guard{test::open_guard(1), clock.grid().period_s()};
     Outbox outbox{capacity, 1U << 12U, when_full};
-    SweepRunner runner{plan,    {.responses = {}, .readbacks = {}, .record_samples = true},
-                       clock,   rig.actuator(),
-                       sensors, guard,
-                       outbox};
+    SweepRunner runner{
+        plan,    {.responses = {}, .readbacks = {}, .record_samples = true, .max_gap_s = 60.0},
+        clock,   rig.actuator(),
+        sensors, guard,
+        outbox};
     RunControl control;
     std::atomic<std::size_t> observed{0};
     record::Recorder recorder{outbox, writer, [&](const Record&) {
