@@ -47,6 +47,10 @@ std::vector<std::pair<std::size_t, std::uint64_t>> LatencyHistogram::filled_bins
   return filled;
 }
 
+std::int64_t latency_ns(const TickGrid& grid, std::uint64_t last, const Tick& tick) noexcept {
+  return grid.time_ns(tick.index) + tick.lateness.count() - grid.time_ns(last + 1);
+}
+
 WakeUps measure_wake_ups(LoopThread& thread, double rate_hz, std::uint64_t wake_ups) {
   WakeUps result;
   MonotonicClock clock{TickGrid{rate_hz}};
@@ -56,7 +60,7 @@ WakeUps measure_wake_ups(LoopThread& thread, double rate_hz, std::uint64_t wake_
     std::uint64_t last = 0;
     for (std::uint64_t i = 0; i < wake_ups; ++i) {
       const Tick tick = clock.wait();
-      result.latency.add(tick.lateness.count());
+      result.latency.add(latency_ns(clock.grid(), last, tick));
       result.skipped += tick.index - last - 1;
       last = tick.index;
     }

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "realtime/loop_thread.h"
-#include "sweep/nonblocking.h"
+#include "sweep/clock.h"
 #include "sweep/thread_usage.h"
 
 namespace sinerig::realtime {
@@ -41,6 +41,11 @@ class LatencyHistogram {
   std::uint64_t count_ = 0;
   std::int64_t max_ns_ = 0;
 };
+
+// From the time for which the thread had asked, the tick after `last`, to when it woke, however
+// many ticks were skipped over it: the lateness of a tick alone never says more than a period.
+std::int64_t latency_ns(const TickGrid& grid, std::uint64_t last,
+                        const Tick& tick) noexcept SINERIG_NONBLOCKING;
 
 struct WakeUps {
   LatencyHistogram latency;

@@ -94,7 +94,8 @@ class NotingClock final : public Clock {
       : Clock{TickGrid{rate_hz}}, left_{ticks + 1}, control_{control} {}
   Tick wait() noexcept SINERIG_NONBLOCKING override {
     const Tick tick = clock_.wait();
-    if (tick.index > 0) latency.add(tick.lateness.count());
+    if (tick.index > 0) latency.add(realtime::latency_ns(grid(), last_, tick));
+    last_ = tick.index;
     if (--left_ == 0) control_.stop_requests.store(2, std::memory_order_relaxed);
     return tick;
   }
@@ -111,6 +112,7 @@ class NotingClock final : public Clock {
  private:
   MonotonicClock clock_{grid()};
   std::uint64_t left_;
+  std::uint64_t last_ = 0;
   RunControl& control_;
 };
 

@@ -41,6 +41,15 @@ TEST(LatencyHistogram, TakesTheBinsOfOthers) {
   EXPECT_EQ(both.max_us(), 5.0);
 }
 
+TEST(Latency, CountsFromTheTimeThatWasAskedFor) {
+  const TickGrid grid{1000.0};
+  const auto after = [&](std::uint64_t index, std::int64_t lateness_ns) {
+    return latency_ns(grid, 7, {.index = index, .lateness = std::chrono::nanoseconds{lateness_ns}});
+  };
+  EXPECT_EQ(after(8, 250'000), 250'000);
+  EXPECT_EQ(after(11, 250'000), 3'250'000) << "three ticks were slept through";
+}
+
 TEST(WakeUps, AreAllCounted) {
   LoopThread thread{Settings{}};
   const WakeUps wake_ups = measure_wake_ups(thread, 2000.0, 200);
