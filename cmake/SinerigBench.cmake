@@ -6,15 +6,19 @@ set_tests_properties(bench_kernel PROPERTIES
   LABELS bench FIXTURES_SETUP bench_kernel TIMEOUT 3000 SKIP_RETURN_CODE 125)
 
 function(sinerig_bench_properties test)
+  set(label bench)
+  if(ARGC GREATER 1)
+    set(label ${ARGV1})
+  endif()
   set_tests_properties(${test} PROPERTIES
-    LABELS bench FIXTURES_REQUIRED bench_kernel TIMEOUT 600 SKIP_RETURN_CODE 125)
+    LABELS ${label} FIXTURES_REQUIRED bench_kernel TIMEOUT 600 SKIP_RETURN_CODE 125)
 endfunction()
 
-# sinerig_bench_test(NAME SOURCES a.cpp … LINK libs …)
+# sinerig_bench_test(NAME [LABEL bench-loop] SOURCES a.cpp … LINK libs …)
 # One GoogleTest binary, run as a whole on one fresh bus. The address space of the bench's kernel is too
 # small for the shadow memory of the address and thread sanitizers.
 function(sinerig_bench_test name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(arg "" "LABEL" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   sinerig_options(${name})
   target_link_libraries(${name} PRIVATE ${arg_LINK} GTest::gmock_main)
@@ -27,6 +31,6 @@ function(sinerig_bench_test name)
   else()
     add_test(NAME ${name}
       COMMAND ${PROJECT_SOURCE_DIR}/tools/virtual-bench --timeout 500 $<TARGET_FILE:${name}>)
-    sinerig_bench_properties(${name})
+    sinerig_bench_properties(${name} ${arg_LABEL})
   endif()
 endfunction()

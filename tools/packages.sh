@@ -14,6 +14,11 @@ test_packages=(
   fonts-dejavu-core python3-scipy python3-jsonschema python3-pymodbus python3-serial-asyncio
 )
 
+# What `tools/bench realtime` measures beside and under.
+bench_packages=(
+  rt-tests stress-ng
+)
+
 # Heavy ones, for the same: the pages in a browser, the exports in Octave, completion in other shells.
 # CI installs them; `tools/test --full` does here.
 optional_test_packages=(

@@ -135,6 +135,7 @@ SendResult Socket::send(const Frame& frame) noexcept {
   raw.flags = frame.bit_rate_switch ? CANFD_BRS : 0;
   std::memcpy(raw.data, frame.data.data(), frame.length);
   const std::size_t size = frame.fd ? CANFD_MTU : CAN_MTU;
+  const SystemCall never_waits;
   const ssize_t sent = ::send(fd_, &raw, size, MSG_DONTWAIT);
   return sent == static_cast<ssize_t>(size) ? SendResult::sent : result_of(errno);
 }
@@ -150,7 +151,11 @@ ReceiveResult Socket::receive(Received& received) noexcept {
   message.msg_control = control;
   message.msg_controllen = sizeof control;
 
-  const ssize_t size = recvmsg(fd_, &message, MSG_DONTWAIT);
+  const auto receive_at_once = [&] {
+    const SystemCall never_waits;
+    return recvmsg(fd_, &message, MSG_DONTWAIT);
+  };
+  const ssize_t size = receive_at_once();
   if (size < 0) {
     if (errno == ENETDOWN) return ReceiveResult::link_down;
     if (errno == ENODEV || errno == ENXIO) return ReceiveResult::gone;
@@ -195,6 +200,7 @@ ReceiveResult Socket::receive(Received& received) noexcept {
 }
 
 bool Socket::rebind() noexcept {
+  const SystemCall never_waits;
   return bind_to(fd_, interface_) && apply_filters();
 }
 

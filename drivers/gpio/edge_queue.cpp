@@ -50,6 +50,7 @@ class EdgeQueue final : public EdgeLines {
   std::optional<std::uint32_t> get() noexcept override {
     gpio_v2_line_values values{};
     values.mask = (std::uint64_t{1} << place_.offsets.size()) - 1;
+    const SystemCall never_waits;
     if (ioctl(fd_, GPIO_V2_LINE_GET_VALUES_IOCTL, &values) != 0) return std::nullopt;
     return static_cast<std::uint32_t>(values.bits) ^ place_.inverted;
   }
@@ -57,6 +58,7 @@ class EdgeQueue final : public EdgeLines {
   std::optional<std::size_t> take(std::span<Edge> edges) noexcept override {
     std::size_t taken = 0;
     while (taken < edges.size()) {
+      const SystemCall never_waits;
       const std::size_t most = std::min(events_.size(), edges.size() - taken);
       const ssize_t bytes = ::read(fd_, events_.data(), most * sizeof events_[0]);
       if (bytes < 0) {

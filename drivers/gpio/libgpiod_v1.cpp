@@ -77,6 +77,7 @@ class Outputs final : public OutputLines {
 
   bool set(std::uint32_t levels) noexcept override {
     const Values values = values_of(levels ^ held_.inverted());
+    const SystemCall never_waits;
     return gpiod_line_set_value_bulk(held_.lines(), values.data()) == 0;
   }
 
@@ -91,6 +92,7 @@ class Inputs final : public InputLines {
 
   std::optional<std::uint32_t> get() noexcept override {
     Values values{};
+    const SystemCall never_waits;
     if (gpiod_line_get_value_bulk(held_.lines(), values.data()) != 0) return std::nullopt;
     std::uint32_t levels = 0;
     for (unsigned n = 0; n < held_.count(); ++n)

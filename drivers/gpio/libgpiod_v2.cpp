@@ -71,6 +71,7 @@ class Held {
 
   std::optional<std::uint32_t> get() noexcept {
     std::array<gpiod_line_value, most_lines> values{};
+    const SystemCall never_waits;
     if (gpiod_line_request_get_values(request_.get(), values.data()) != 0) return std::nullopt;
     std::uint32_t levels = 0;
     for (std::size_t n = 0; n < place_.offsets.size(); ++n)
@@ -82,6 +83,7 @@ class Held {
     std::array<gpiod_line_value, most_lines> values{};
     for (std::size_t n = 0; n < most_lines; ++n)
       values[n] = value_of((((levels ^ place_.inverted) >> n) & 1U) != 0);
+    const SystemCall never_waits;
     return gpiod_line_request_set_values(request_.get(), values.data()) == 0;
   }
 
@@ -137,6 +139,7 @@ class Edges final : public EdgeLines {
     std::size_t taken = 0;
     while (taken < edges.size()) {
       const std::size_t most = std::min(buffer_length, edges.size() - taken);
+      const SystemCall never_waits;
       const int read = gpiod_line_request_read_edge_events(held_.request(), buffer_.get(), most);
       if (read < 0) {
         if (errno == EAGAIN || errno == EINTR) break;

@@ -31,6 +31,7 @@ constexpr const char* description =
     "\n"
     "  sinerig plan config/gimbal.toml     what would be run, and for how long; nothing moves\n"
     "  sinerig check config/gimbal.toml    reads every channel for a while; nothing moves\n"
+    "  sinerig doctor                      what this machine gives a loop in real time\n"
     "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
@@ -131,6 +132,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   CLI::App* reporter = add_report(app, report_options);
   CheckOptions check_options;
   CLI::App* check = add_check(app, check_options);
+  DoctorOptions doctor_options;
+  CLI::App* doctor = add_doctor(app, doctor_options);
   FitCommandOptions fit_options;
   CLI::App* fit = add_fit(app, fit_options);
   MarginsOptions margins_options;
@@ -161,6 +164,7 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   try {
     if (plan->parsed()) return plan_command(plan_options, drivers);
     if (check->parsed()) return check_command(check_options, drivers);
+    if (doctor->parsed()) return doctor_command(doctor_options);
     if (run->parsed()) return run_command(run_options, drivers);
     if (show->parsed()) return show_command(show_options);
     if (exporter->parsed()) return export_command(export_options);

@@ -1,11 +1,13 @@
 #include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <exception>
 #include <iostream>
 
 #include "cli/channel_check.h"
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
+#include "cli/real_time.h"
 
 namespace sinerig::cli {
 
@@ -93,15 +95,33 @@ std::vector<std::string> obstacles(const RigCheck& check, const config::Rig& rig
   return found;
 }
 
+// As a sweep would: with the rights that its loop has.
+RigCheck check_on(realtime::LoopThread& loop, ConfiguredRig& configured, double seconds) {
+  RigCheck check;
+  std::exception_ptr failure;
+  const auto look = [&] {
+    try {
+      check = check_channels(configured.clock(), configured.sensors(), configured.rig().guard,
+                             seconds, stop_requested);
+    } catch (...) {
+      failure = std::current_exception();
+    }
+  };
+  loop.start(look, {});
+  loop.join();
+  if (failure) std::rethrow_exception(failure);
+  return check;
+}
+
 }  // namespace
 
 int check_command(const CheckOptions& options, const std::vector<DriverKit>& drivers) {
   ConfiguredRig configured{options.rig, drivers};
   const config::Rig& rig = configured.rig();
   const StopOnInterrupt stop_on_interrupt;
+  const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   configured.open();
-  const RigCheck check = check_channels(configured.clock(), configured.sensors(), rig.guard,
-                                        options.seconds, stop_requested);
+  const RigCheck check = check_on(*loop, configured, options.seconds);
   const std::vector<Remark> remarks = configured.remarks();
 
   const bool in_virtual_time = rig.clock == config::ClockKind::virtual_time;

@@ -46,6 +46,13 @@ struct CheckOptions {
   double seconds = 3.0;
 };
 
+struct DoctorOptions {
+  std::string rig;       // empty: the defaults of a rig file, at 1 kHz
+  double seconds = 5.0;  // of measured wake-ups
+  bool strict = false;   // exit code 1 where something is missing
+  bool json = false;
+};
+
 struct ShowOptions {
   std::string file;
   bool json = false;
@@ -87,6 +94,7 @@ int check_command(const CheckOptions& options, const std::vector<DriverKit>& dri
 int export_command(const ExportOptions& options);
 int report_command(const ReportOptions& options);
 int compare_command(const CompareOptions& options);
+int doctor_command(const DoctorOptions& options);
 int drivers_command(const std::vector<DriverKit>& drivers);
 
 }  // namespace sinerig::cli

@@ -68,8 +68,9 @@ std::string synopsis_of(const CLI::App& app) {
   std::string line = app.get_name();
   for (const CLI::Option* option : app.get_options()) {
     if (!option->get_positional()) continue;
-    line += " " + option->get_name(true);
-    if (option->get_items_expected_max() > 1) line += "...";
+    std::string name = option->get_name(true);
+    if (option->get_items_expected_max() > 1) name += "...";
+    line += option->get_required() ? " " + name : " [" + name + "]";
   }
   return line + " [OPTION...]";
 }

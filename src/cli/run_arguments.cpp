@@ -26,6 +26,22 @@ CLI::App* add_check(CLI::App& app, CheckOptions& options) {
   return check;
 }
 
+CLI::App* add_doctor(CLI::App& app, DoctorOptions& options) {
+  CLI::App* doctor = app.add_subcommand(
+      "doctor",
+      "Say what this machine gives a loop in real time and how to get the rest, then measure how "
+      "late its wake-ups are");
+  doctor->add_option(
+      "RIG", options.rig,
+      "rig file (TOML) whose [loop] counts (default: priority 80, any CPU, 1000 Hz)");
+  doctor->add_option("--seconds", options.seconds, "how long to measure")
+      ->check(CLI::Range(0.1, 3600.0))
+      ->capture_default_str();
+  doctor->add_flag("--strict", options.strict, "exit code 1 where something is missing");
+  doctor->add_flag("--json", options.json, "print one JSON object");
+  return doctor;
+}
+
 CLI::App* add_run(CLI::App& app, RunOptions& options) {
   CLI::App* run = app.add_subcommand("run", "Run the sweep of a rig file and write a sweep file");
   run->add_option("RIG", options.rig, "rig file (TOML)")->required();

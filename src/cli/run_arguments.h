@@ -12,6 +12,7 @@ namespace sinerig::cli {
 
 CLI::App* add_plan(CLI::App& app, PlanOptions& options);
 CLI::App* add_check(CLI::App& app, CheckOptions& options);
+CLI::App* add_doctor(CLI::App& app, DoctorOptions& options);
 CLI::App* add_run(CLI::App& app, RunOptions& options);
 
 // The program's arguments for CLI11, last first. `--serve` may stand alone: what follows is its

@@ -8,6 +8,7 @@
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
 #include "cli/live_view.h"
+#include "cli/real_time.h"
 #include "cli/report_file.h"
 #include "cli/run_teller.h"
 #include "cli/service_notifier.h"
@@ -77,10 +78,27 @@ struct Audience {
   record::Recorder::Samples samples;
 };
 
+// Whatever happens to those who watch: the loop ends, neutral, before what it works on is gone.
+class EndOfLoop {
+ public:
+  EndOfLoop(realtime::LoopThread& loop, RunControl& control) : loop_{loop}, control_{control} {}
+  ~EndOfLoop() {
+    control_.stop_requests.store(2);
+    loop_.join();
+  }
+  EndOfLoop(const EndOfLoop&) = delete;
+  EndOfLoop& operator=(const EndOfLoop&) = delete;
+
+ private:
+  realtime::LoopThread& loop_;
+  RunControl& control_;
+};
+
 // The loop on its own thread, its story told on this one, until both the loop and the recorder are
 // done.
-RunOutcome play(const SweepPlan& plan, SweepRunner& runner, RunControl& control, Outbox& outbox,
-                record::SweepWriter& writer, const Audience& audience) {
+RunOutcome play(const SweepPlan& plan, realtime::LoopThread& loop, SweepRunner& runner,
+                RunControl& control, Outbox& outbox, record::SweepWriter& writer,
+                const Audience& audience) {
   PointInbox inbox;
   report::RemainingTime time{plan};
   audience.service.ready();
@@ -91,12 +109,12 @@ RunOutcome play(const SweepPlan& plan, SweepRunner& runner, RunControl& control,
   record::Recorder recorder{outbox, writer, observe, audience.samples};
   RunOutcome outcome;
   std::atomic<bool> done{false};
-  std::thread loop{[&] {
-    outcome = runner.run(control);
-    outbox.close();
-    done.store(true);
-    done.notify_one();
-  }};
+  loop.start([&] { outcome = runner.run(control); },
+             [&] {
+               outbox.close();
+               done.store(true);
+             });
+  const EndOfLoop end_of_loop{loop, control};
   const auto tell = [&] {
     for (const Point& point : inbox.take()) audience.teller.point(point);
     const std::uint32_t dwell = control.dwell.load();
@@ -159,6 +177,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const config::Rig& rig = configured.rig();
   const SweepPlan plan = rig.plan();
   Clock& clock = configured.clock();
+  const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   RunControl control;
   const StopOnSignal stop_on_signal{control};
   const std::string path =
@@ -172,6 +191,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   record::SweepWriter writer{path, run_info(rig, plan),
                              options.force ? record::SweepWriter::IfExists::replace
                                            : record::SweepWriter::IfExists::refuse};
+  record_grants(writer, loop->grants());
   const bool in_real_time = rig.clock == config::ClockKind::monotonic;
   Outbox outbox{outbox_slots, outbox_backlog,
                 in_real_time ? Outbox::WhenFull::keep : Outbox::WhenFull::wait};
@@ -195,7 +215,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
                      &configured};
   const bool keep_samples = rig.runner.record_samples || !view;
   ServiceNotifier service;
-  const RunOutcome outcome = play(plan, runner, control, outbox, writer,
+  const RunOutcome outcome = play(plan, *loop, runner, control, outbox, writer,
                                   {.teller = teller,
                                    .service = service,
                                    .view = view.get(),

@@ -34,6 +34,22 @@ ClockKind read_clock(const Section& loop, bool simulated) {
   return name == "virtual" ? ClockKind::virtual_time : ClockKind::monotonic;
 }
 
+realtime::Settings read_realtime(const Section& loop) {
+  realtime::Settings settings;
+  settings.priority =
+      static_cast<int>(loop.integer("priority", {.min = 1.0, .max = 99.0}, settings.priority));
+  if (const auto cpu = loop.integer("cpu", {.min = -1.0, .max = 1023.0}, -1); cpu >= 0)
+    settings.cpu = static_cast<int>(cpu);
+  return settings;
+}
+
+bool read_require_realtime(const Section& loop, ClockKind clock) {
+  const bool required = loop.flag("require_realtime", false);
+  if (required && clock == ClockKind::virtual_time)
+    loop.refuse("require_realtime", "needs clock = \"monotonic\"; a virtual clock is never late");
+  return required;
+}
+
 Range below_half(double rate_hz) {
   return {.min = 0.0, .max = rate_hz / 2.0, .open_min = true, .open_max = true};
 }
@@ -252,6 +268,8 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
                                      [](const Channel& sensor) { return sensor.driver == "sim"; });
   rig.rate_hz = read_rate(loop);
   rig.clock = read_clock(loop, simulated);
+  rig.realtime = read_realtime(loop);
+  rig.require_realtime = read_require_realtime(loop, rig.clock);
   rig.sweep = read_sweep(sweep, rig.rate_hz);
   rig.motion = read_motion(limits);
   rig.guard = read_guard(limits, rig.motion, rig.rate_hz);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "config/section.h"
+#include "realtime/rights.h"
 #include "sweep/guard.h"
 #include "sweep/plan.h"
 #include "sweep/runner.h"
@@ -28,6 +29,8 @@ struct Rig {
 
   double rate_hz = 0.0;
   ClockKind clock = ClockKind::monotonic;
+  realtime::Settings realtime{};  // of the loop's thread; nothing to a virtual clock
+  bool require_realtime = false;  // refuse to run where one of its rights is missing
   SweepSettings sweep{};
   MotionLimits motion{};
   GuardSettings guard{};

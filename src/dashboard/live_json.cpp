@@ -96,6 +96,8 @@ Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) 
   std::vector<std::uint64_t> histogram(DwellTiming::bins);
   Json frequencies = Json::array();
   Json latest = Json::array();
+  Json faults = Json::array();
+  Json switches = Json::array();
   Json events = Json::array();
   for (const Record& entry : entries) {
     if (const auto* point = std::get_if<Point>(&entry)) {
@@ -106,6 +108,9 @@ Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) 
         frequencies.push_back(
             rounded(run.plan.dwells[timing->dwell].frequency_hz(run.plan.rate_hz), 9));
         latest.push_back(rounded(1e-3 * static_cast<double>(timing->max_lateness_ns), 4));
+        const ThreadUsage usage = timing->usage.value_or(ThreadUsage{});
+        faults.push_back(usage.minor_faults + usage.major_faults);
+        switches.push_back(usage.involuntary_switches);
       }
       for (std::size_t bin = 0; bin < histogram.size(); ++bin)
         histogram[bin] += timing->lateness[bin];
@@ -124,7 +129,12 @@ Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) 
     responses.push_back(json);
   }
   return {{"responses", responses},
-          {"timing", {{"f", frequencies}, {"late_us", latest}, {"histogram", histogram}}},
+          {"timing",
+           {{"f", frequencies},
+            {"late_us", latest},
+            {"faults", faults},
+            {"switches", switches},
+            {"histogram", histogram}}},
           {"events", events}};
 }
 

@@ -38,6 +38,9 @@ class WatchedClock final : public Clock {
   std::int64_t time_ns(Instant instant) const noexcept SINERIG_NONBLOCKING override {
     return clock_.time_ns(instant);
   }
+  std::optional<ThreadUsage> usage() const noexcept SINERIG_NONBLOCKING override {
+    return clock_.usage();
+  }
 
  private:
   Clock& clock_;

@@ -2,6 +2,7 @@
 // which file and what SQLite said.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -60,6 +61,9 @@ class Statement {
   void bind_one(int index, std::uint32_t value) { bind_one(index, std::int64_t{value}); }
   void bind_one(int index, std::uint64_t value) {
     bind_one(index, static_cast<std::int64_t>(value));
+  }
+  void bind_one(int index, std::optional<std::uint64_t> value) {
+    value ? bind_one(index, *value) : bind_one(index, std::nan(""));
   }
   void check(int code) const;
 

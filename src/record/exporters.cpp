@@ -102,13 +102,19 @@ Json events_json(const StoredRun& run) {
 Json timing_json(const StoredRun& run) {
   Json timings = Json::array();
   for (const StoredTiming& timing : run.timings) {
+    const auto usage = [&](std::uint64_t ThreadUsage::*count) {
+      return timing.usage ? Json(*timing.usage.*count) : Json(nullptr);
+    };
     timings.push_back({{"dwell", timing.dwell},
                        {"first_tick", timing.first_tick},
                        {"ticks", timing.ticks},
                        {"skipped", timing.skipped},
                        {"resettles", timing.resettles},
                        {"max_lateness_ns", timing.max_lateness_ns},
-                       {"lateness_us", timing.lateness_us}});
+                       {"lateness_us", timing.lateness_us},
+                       {"minor_faults", usage(&ThreadUsage::minor_faults)},
+                       {"major_faults", usage(&ThreadUsage::major_faults)},
+                       {"involuntary_switches", usage(&ThreadUsage::involuntary_switches)}});
   }
   return timings;
 }

@@ -91,7 +91,10 @@ CREATE TABLE timing (           -- of the loop, per dwell
   skipped         INTEGER NOT NULL, -- lost to overruns
   resettles       INTEGER NOT NULL,
   max_lateness_ns INTEGER NOT NULL,
-  lateness_us     TEXT NOT NULL     -- counts: below 1 µs, [1, 2), [2, 4), [4, 8) µs …
+  lateness_us     TEXT NOT NULL,    -- counts: below 1 µs, [1, 2), [2, 4), [4, 8) µs …
+  minor_faults    INTEGER,          -- page faults of the loop's thread; NULL: virtual time
+  major_faults    INTEGER,          -- those that had to wait for a disk
+  involuntary_switches INTEGER      -- times that another thread was given its CPU
 );
 
 CREATE TABLE event (

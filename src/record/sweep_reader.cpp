@@ -28,11 +28,16 @@ void check_identity(Database& database, const std::string& path) {
   }
 }
 
+// Columns that came after the first files of this version.
+bool has_column(Database& database, const std::string& table, const std::string& name) {
+  Statement column{database, "SELECT 1 FROM pragma_table_info(?) WHERE name = ?"};
+  column.bind(table, name);
+  return column.step();
+}
+
 SweepPlan read_plan(Database& database, double rate_hz) {
   SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
-  // The column came after the first files of this version.
-  Statement column{database, "SELECT 1 FROM pragma_table_info('dwell') WHERE name = 'sub_band'"};
-  const std::string sub_band = column.step() ? "sub_band" : "0";
+  const std::string sub_band = has_column(database, "dwell", "sub_band") ? "sub_band" : "0";
   Statement dwells{database,
                    "SELECT asked_hz, block_samples, ramp_samples, settle_samples, blocks, "
                    "max_samples, " +
@@ -117,9 +122,13 @@ std::vector<StoredEvent> read_events(Database& database) {
 
 std::vector<StoredTiming> read_timings(Database& database) {
   std::vector<StoredTiming> timings;
+  const std::string usage = has_column(database, "timing", "minor_faults")
+                                ? "minor_faults, major_faults, involuntary_switches"
+                                : "NULL, NULL, NULL";
   Statement rows{database,
-                 "SELECT dwell, first_tick, ticks, skipped, resettles, "
-                 "max_lateness_ns, lateness_us FROM timing ORDER BY dwell"};
+                 "SELECT dwell, first_tick, ticks, skipped, resettles, max_lateness_ns, "
+                 "lateness_us, " +
+                     usage + " FROM timing ORDER BY dwell"};
   while (rows.step()) {
     timings.push_back({.dwell = whole<std::uint32_t>(rows, 0),
                        .first_tick = whole<std::uint64_t>(rows, 1),
@@ -128,11 +137,24 @@ std::vector<StoredTiming> read_timings(Database& database) {
                        .resettles = whole<std::uint32_t>(rows, 4),
                        .max_lateness_ns = rows.integer(5),
                        .lateness_us = rows.text(6)});
+    if (!std::isnan(rows.number(7))) {
+      timings.back().usage = {.minor_faults = whole<std::uint64_t>(rows, 7),
+                              .major_faults = whole<std::uint64_t>(rows, 8),
+                              .involuntary_switches = whole<std::uint64_t>(rows, 9)};
+    }
   }
   return timings;
 }
 
 }  // namespace
+
+std::optional<ThreadUsage> StoredRun::usage() const {
+  std::optional<ThreadUsage> all;
+  for (const StoredTiming& timing : timings) {
+    if (timing.usage) all = all.value_or(ThreadUsage{}) + *timing.usage;
+  }
+  return all;
+}
 
 std::string StoredRun::fact(const std::string& key) const {
   const auto found = facts.find(key);

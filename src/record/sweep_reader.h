@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -54,6 +55,7 @@ struct StoredTiming {
   std::uint32_t resettles = 0;
   std::int64_t max_lateness_ns = 0;
   std::string lateness_us;
+  std::optional<ThreadUsage> usage{};  // nothing: virtual time, or a file from before it was kept
 };
 
 // The points of one pair of channels, by rising frequency.
@@ -71,6 +73,9 @@ struct StoredRun {
   std::vector<StoredEvent> events;
   std::vector<StoredTiming> timings;
   std::vector<StoredFit> fits;
+
+  // Of all dwells; nothing where none has it.
+  std::optional<ThreadUsage> usage() const;
 
   // A fact, empty where the file has none.
   std::string fact(const std::string& key) const;

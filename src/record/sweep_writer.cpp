@@ -64,7 +64,7 @@ struct SweepWriter::Statements {
       : run{database, "INSERT OR REPLACE INTO run VALUES (?, ?)"},
         point{database, "INSERT INTO point VALUES (" + placeholders(25) + ")"},
         block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"},
-        timing{database, "INSERT INTO timing VALUES (?, ?, ?, ?, ?, ?, ?)"},
+        timing{database, "INSERT INTO timing VALUES (" + placeholders(10) + ")"},
         event{database, "INSERT INTO event VALUES (NULL, ?, ?, ?, nullif(?, 0), ?, ?, ?)"},
         sample{database, "INSERT INTO sample VALUES (?, ?, ?)"} {}
 
@@ -175,9 +175,13 @@ void SweepWriter::insert(const Block& block) {
 }
 
 void SweepWriter::insert(const DwellTiming& timing) {
+  const auto usage = [&](std::uint64_t ThreadUsage::*count) {
+    return timing.usage ? std::optional{*timing.usage.*count} : std::nullopt;
+  };
   statements_->timing
       .bind(timing.dwell, timing.first_tick, timing.ticks, timing.skipped, timing.resettles,
-            timing.max_lateness_ns, histogram_text(timing))
+            timing.max_lateness_ns, histogram_text(timing), usage(&ThreadUsage::minor_faults),
+            usage(&ThreadUsage::major_faults), usage(&ThreadUsage::involuntary_switches))
       .run();
 }
 

@@ -91,7 +91,8 @@ Json loop_fact(const StoredRun& run) {
            run.fact("clock") == "virtual"
                ? ", virtual clock"
                : text(", latest %.0f µs", static_cast<double>(latest_ns) * 1e-3).c_str());
-  return {"Loop", std::to_string(skipped), remark};
+  const std::optional<ThreadUsage> usage = run.usage();
+  return {"Loop", std::to_string(skipped), usage ? remark + ", " + usage_text(*usage) : remark};
 }
 
 Json events_json(const StoredRun& run) {
@@ -113,11 +114,16 @@ Json events_json(const StoredRun& run) {
 Json timing_json(const StoredRun& run) {
   Json frequencies = Json::array();
   Json latest = Json::array();
+  Json faults = Json::array();
+  Json switches = Json::array();
   std::vector<std::uint64_t> histogram;
   for (const record::StoredTiming& timing : run.timings) {
     if (timing.dwell >= run.plan.dwells.size()) continue;
     frequencies.push_back(run.plan.dwells[timing.dwell].frequency_hz(run.plan.rate_hz));
     latest.push_back(static_cast<double>(timing.max_lateness_ns) * 1e-3);
+    const ThreadUsage usage = timing.usage.value_or(ThreadUsage{});
+    faults.push_back(usage.minor_faults + usage.major_faults);
+    switches.push_back(usage.involuntary_switches);
     std::istringstream counts{timing.lateness_us};
     std::uint64_t count = 0;
     for (std::size_t bin = 0; counts >> count; ++bin) {
@@ -125,7 +131,11 @@ Json timing_json(const StoredRun& run) {
       histogram[bin] += count;
     }
   }
-  return {{"f", frequencies}, {"late_us", latest}, {"histogram", histogram}};
+  return {{"f", frequencies},
+          {"late_us", latest},
+          {"faults", faults},
+          {"switches", switches},
+          {"histogram", histogram}};
 }
 
 }  // namespace

@@ -55,6 +55,15 @@ std::string lengths(const Dwell& dwell, double rate_hz) {
 
 }  // namespace
 
+std::string usage_text(const ThreadUsage& usage) {
+  const std::uint64_t faults = usage.minor_faults + usage.major_faults;
+  const std::uint64_t switches = usage.involuntary_switches;
+  std::string words = std::to_string(faults) + (faults == 1 ? " page fault" : " page faults");
+  if (usage.major_faults > 0) words += " (" + std::to_string(usage.major_faults) + " from a disk)";
+  return words + ", " + std::to_string(switches) +
+         (switches == 1 ? " involuntary switch" : " involuntary switches");
+}
+
 std::string duration_text(double seconds) {
   const auto whole = static_cast<long>(std::llround(seconds));
   if (whole < 3600) return text("%ld:%02ld", whole / 60, whole % 60);
@@ -147,6 +156,25 @@ void print_plan(std::ostream& stream, const SweepPlan& plan, const SweepSettings
 
 namespace {
 
+// What the loop's thread had of the real-time rights that it asked for.
+void print_rights(std::ostream& stream, const record::StoredRun& run) {
+  const std::string prefix = "realtime_";
+  const std::string mark = "missing: ";
+  std::string missing;
+  bool asked = false;
+  for (const auto& [key, value] : run.facts) {
+    if (!key.starts_with(prefix)) continue;
+    asked = true;
+    if (value.starts_with(mark))
+      missing += (missing.empty() ? "" : ", ") + key.substr(prefix.size());
+  }
+  if (!asked) return;
+  if (missing.empty())
+    stream << "rights   " << run.fact("realtime_scheduling") << ", and all others asked for\n";
+  else
+    stream << "rights   without " << missing << '\n';
+}
+
 // Which run it is and how it went.
 void print_head(std::ostream& stream, const record::StoredRun& run) {
   if (!run.fact("imported_from").empty()) {
@@ -169,9 +197,12 @@ void print_head(std::ostream& stream, const record::StoredRun& run) {
     skipped += timing.skipped;
     max_lateness_ns = std::max(max_lateness_ns, timing.max_lateness_ns);
   }
-  stream << text("loop     %llu ticks, %llu skipped, %.1f µs late at most\n",
+  stream << text("loop     %llu ticks, %llu skipped, %.1f µs late at most",
                  static_cast<unsigned long long>(ticks), static_cast<unsigned long long>(skipped),
                  static_cast<double>(max_lateness_ns) * 1e-3);
+  if (const auto usage = run.usage()) stream << ", " << usage_text(*usage);
+  stream << '\n';
+  print_rights(stream, run);
 }
 
 }  // namespace

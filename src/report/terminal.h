@@ -26,6 +26,9 @@ std::string plan_size_text(const SweepPlan& plan);
 // "7:34 (454.5 s)", or the least and the most where the plan leaves it open.
 std::string bench_time_text(const SweepPlan& plan);
 
+// "3 page faults (1 from a disk), 2 involuntary switches", of the loop's thread.
+std::string usage_text(const ThreadUsage& usage);
+
 // 93784 s → "26:03:04", 12.3 s → "0:12".
 std::string duration_text(double seconds);
 

@@ -6,6 +6,8 @@
 #include <ctime>
 #include <stdexcept>
 
+#include <sys/resource.h>
+
 namespace sinerig {
 
 namespace {
@@ -26,6 +28,7 @@ std::int64_t monotonic_ns() noexcept {
 }
 
 void sleep_until(std::int64_t time_ns) noexcept {
+  const SystemCall waits_by_design;
   const timespec deadline{.tv_sec = time_ns / ns_per_s, .tv_nsec = time_ns % ns_per_s};
   while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
   }
@@ -106,6 +109,15 @@ Instant MonotonicClock::now() const noexcept {
 
 std::int64_t MonotonicClock::time_ns(Instant instant) const noexcept {
   return origin_ns_ + grid().time_ns(instant.tick) + instant.offset_ns;
+}
+
+std::optional<ThreadUsage> MonotonicClock::usage() const noexcept {
+  rusage usage{};
+  const SystemCall reads_counters;
+  if (getrusage(RUSAGE_THREAD, &usage) != 0) return {};
+  return ThreadUsage{.minor_faults = static_cast<std::uint64_t>(usage.ru_minflt),
+                     .major_faults = static_cast<std::uint64_t>(usage.ru_majflt),
+                     .involuntary_switches = static_cast<std::uint64_t>(usage.ru_nivcsw)};
 }
 
 }  // namespace sinerig

@@ -4,8 +4,10 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 
 #include "sweep/nonblocking.h"
+#include "sweep/thread_usage.h"
 
 namespace sinerig {
 
@@ -67,6 +69,9 @@ class Clock {
   // The time base of Sample::time_ns.
   virtual std::int64_t time_ns(Instant instant) const noexcept SINERIG_NONBLOCKING = 0;
 
+  // Of the calling thread so far; nothing where time is virtual and the machine does not matter.
+  virtual std::optional<ThreadUsage> usage() const noexcept SINERIG_NONBLOCKING { return {}; }
+
   const TickGrid& grid() const noexcept { return grid_; }
 
  private:
@@ -93,6 +98,7 @@ class MonotonicClock final : public Clock {
   Tick wait() noexcept SINERIG_NONBLOCKING override;
   Instant now() const noexcept SINERIG_NONBLOCKING override;
   std::int64_t time_ns(Instant instant) const noexcept SINERIG_NONBLOCKING override;
+  std::optional<ThreadUsage> usage() const noexcept SINERIG_NONBLOCKING override;
 
  private:
   void note_suspension(std::int64_t asleep_ns) noexcept SINERIG_NONBLOCKING;

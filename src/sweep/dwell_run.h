@@ -30,6 +30,7 @@ class DwellRun {
   // `ticks` of the grid have passed since the last call, this one included.
   void pass(const Tick& tick, std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
   void note_range_fault(std::size_t sensor) noexcept { ++range_faults_[sensor]; }
+  void note_usage(const ThreadUsage& usage) noexcept { timing_.usage = usage; }
 
   // What was applied and read at this tick, the applied signal first; `disturbed`: the command was
   // late or lost.

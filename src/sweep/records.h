@@ -4,6 +4,7 @@
 #include <array>
 #include <complex>
 #include <cstdint>
+#include <optional>
 #include <type_traits>
 #include <variant>
 
@@ -12,6 +13,7 @@
 #include "sweep/guard.h"
 #include "sweep/preflight.h"
 #include "sweep/regression.h"
+#include "sweep/thread_usage.h"
 
 namespace sinerig {
 
@@ -100,6 +102,7 @@ struct DwellTiming {
   std::int64_t max_lateness_ns = 0;
   std::array<std::uint32_t, bins>
       lateness{};  // bin k counts lateness in [2^(k−1), 2^k) µs, bin 0 below 1 µs
+  std::optional<ThreadUsage> usage{};  // of the loop's thread, all tries of the dwell; see Clock
 };
 
 enum class EventKind : std::uint8_t {

@@ -69,6 +69,7 @@ RunOutcome SweepRunner::run(RunControl& control) noexcept {
   announce({.kind = EventKind::started});
   do {
     const ReleaseOnExit release{actuator_};
+    usage_ = clock_.usage();
     while (step(control)) {
     }
   } while (recover(control));

@@ -57,6 +57,7 @@ class SweepRunner {
   void tell_trip(EventKind kind) noexcept;
   void finish_dwell() noexcept;
   void next_dwell() noexcept;
+  void account_usage() noexcept SINERIG_NONBLOCKING;
   void refine() noexcept;
   void note_sensor(std::size_t sensor, const Sample& sample, std::uint64_t tick) noexcept;
   void announce(const Event& event) noexcept { sink_.put(event); }
@@ -94,6 +95,8 @@ class SweepRunner {
   bool command_late_ = false;
   bool applied_known_ = false;
   std::int64_t applied_offset_ns_ = 0;  // of the last command from its tick
+  DwellTiming timing_;
+  std::optional<ThreadUsage> usage_;  // of the loop's thread, at the end of the dwell before
   std::uint64_t last_tick_ = 0;
   RunOutcome outcome_;
 };

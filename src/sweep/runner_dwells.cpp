@@ -180,9 +180,18 @@ void SweepRunner::finish_dwell() noexcept {
     }
     if (refining) refiner_.learn();
   }
+  account_usage();
   sink_.put(run_.timing());
   outcome_.skipped_ticks += run_.timing().skipped;
   run_.end();
+}
+
+// The loop's one system call of its own besides the sleep: once a dwell, in its last tick, when the
+// command is out and every sensor has been read. It never waits.
+void SweepRunner::account_usage() noexcept {
+  const std::optional<ThreadUsage> now = clock_.usage();
+  if (now && usage_) run_.note_usage(*now - *usage_);
+  usage_ = now;
 }
 
 }  // namespace sinerig

@@ -51,8 +51,10 @@ if options.within:
     delay_s = (sum(omega(got) * lag(expected, got) for expected, got in pairs)
                / sum(omega(got) ** 2 for expected, got in pairs))
     print(f"delay of the drive {delay_s:.2e} s")
-    if not -1e-9 < delay_s < 1e-6:
-        sys.exit("FAILED: the delay must be between 0 and 1e-6 s")
+    # The drive shares the bench's one CPU with a loop in real time, which goes first: what its tick costs
+    # in virtual time, mostly readings of the clock, is waited for.
+    if not -1e-9 < delay_s < 2e-6:
+        sys.exit("FAILED: the delay must be between 0 and 2e-6 s")
 worst = 0.0
 for expected, got in pairs:
     frequency_hz = float(got["freq_hz"])

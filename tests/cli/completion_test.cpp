@@ -33,6 +33,9 @@ TEST_F(Completion, BashOffersCommandsOptionsValuesAndFiles) {
   workshop_.write("gimbal.sweep", "");
   workshop_.write("gimbal.txt.orig", "");
   EXPECT_EQ(offered("sinerig run gim", 2), "gimbal.toml\n");
+  EXPECT_EQ(offered("sinerig doc", 1), "doctor\n");
+  EXPECT_EQ(offered("sinerig doctor --str", 2), "--strict\n");
+  EXPECT_EQ(offered("sinerig doctor gim", 2), "gimbal.toml\n");
   EXPECT_EQ(offered("sinerig report gim", 2), "gimbal.sweep\n");
 }
 
@@ -52,8 +55,9 @@ TEST_F(Completion, ZshAndFishTakeTheirScripts) {
 TEST_F(Completion, ManualHoldsEveryCommandAndIsGoodRoff) {
   const std::string page = workshop_.sinerig("manual").output;
   workshop_.write("sinerig.1", page);
-  EXPECT_THAT(page, AllOf(HasSubstr(".SS \"notch FILE... [OPTION...]\""), HasSubstr("\\-\\-serve"),
-                          HasSubstr(".SH EXIT STATUS")));
+  EXPECT_THAT(page,
+              AllOf(HasSubstr(".SS \"notch FILE... [OPTION...]\""), HasSubstr("\\-\\-serve"),
+                    HasSubstr(".SS \"doctor [RIG] [OPTION...]\""), HasSubstr(".SH EXIT STATUS")));
   if (!here("groff")) GTEST_SKIP() << "no groff here to read the page (Debian: apt install groff)";
   const auto read = workshop_.shell("groff -man -Tutf8 -ww sinerig.1");
   EXPECT_EQ(read.errors, "");

@@ -227,6 +227,13 @@ INSTANTIATE_TEST_SUITE_P(
                "driver = \"can\"",
                "rig.toml:3: [loop] clock = 'virtual': needs every driver to be \"sim\"; hardware "
                "runs on \"monotonic\""},
+        Change{"PriorityTooHigh", 2, "rate_hz = 1000\npriority = 100",
+               "rig.toml:3: [loop] priority = 100: must be at least 1 and at most 99"},
+        Change{"CpuTooHigh", 2, "rate_hz = 1000\ncpu = 1024",
+               "rig.toml:3: [loop] cpu = 1024: must be at least -1 and at most 1023"},
+        Change{"RealTimeOfAVirtualClock", 2, "rate_hz = 1000\nrequire_realtime = true",
+               "rig.toml:3: [loop] require_realtime = true: needs clock = \"monotonic\"; a virtual "
+               "clock is never late"},
         Change{"NoSuchOutput", 13, "output = \"z\"",
                "rig.toml:13: [sensor.y] output = 'z': the plant has no such output; it has \"y\" "
                "\"error_code\""},

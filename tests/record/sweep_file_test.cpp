@@ -92,7 +92,10 @@ TEST_F(SweepFile, IsReadBackAsItWasWritten) {
     unknown.reason = PointReason::gaps;
     unknown.reason_value = 3.0;
     writer.write(unknown);
-    writer.write(DwellTiming{.dwell = 0, .first_tick = 7, .ticks = 100, .skipped = 2});
+    const ThreadUsage usage{.minor_faults = 5, .major_faults = 1, .involuntary_switches = 4};
+    writer.write(
+        DwellTiming{.dwell = 0, .first_tick = 7, .ticks = 100, .skipped = 2, .usage = usage});
+    writer.write(DwellTiming{.dwell = 1, .first_tick = 107, .ticks = 50});
     const Trip trip{.cause = TripCause::channel_limit, .channel = 0, .value = 3.0, .limit = 2.0};
     writer.write(Event{.kind = EventKind::tripped, .tick = 12, .trip = trip});
     writer.set("outcome", "stopped");
@@ -126,12 +129,32 @@ TEST_F(SweepFile, IsReadBackAsItWasWritten) {
   EXPECT_EQ(points[2].status, "rt_fault");
   EXPECT_EQ(points[2].reason, "gaps");
   EXPECT_EQ(points[2].reason_value, 3.0);
-  ASSERT_EQ(run.timings.size(), 1U);
+  ASSERT_EQ(run.timings.size(), 2U);
   EXPECT_EQ(run.timings[0].first_tick, 7U);
   EXPECT_EQ(run.timings[0].skipped, 2U);
+  EXPECT_EQ(run.timings[0].usage,
+            (ThreadUsage{.minor_faults = 5, .major_faults = 1, .involuntary_switches = 4}));
+  EXPECT_EQ(run.timings[1].usage, std::nullopt);
+  EXPECT_EQ(run.usage(), run.timings[0].usage);
   ASSERT_EQ(run.events.size(), 2U);
   EXPECT_EQ(run.events[1].kind, "tripped");
   EXPECT_THAT(run.events[1].detail, HasSubstr("gyro = 3 is outside its limit 2"));
+}
+
+TEST_F(SweepFile, FromBeforeTheThreadsUsageWasKeptIsReadWithoutIt) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.write(DwellTiming{.dwell = 0, .ticks = 100, .usage = ThreadUsage{.minor_faults = 5}});
+    writer.finish();
+  }
+  EXPECT_TRUE(read_sweep(path()).usage());
+  execute(path(),
+          "ALTER TABLE timing DROP COLUMN minor_faults; ALTER TABLE timing DROP COLUMN "
+          "major_faults; ALTER TABLE timing DROP COLUMN involuntary_switches");
+  const StoredRun run = read_sweep(path());
+  ASSERT_EQ(run.timings.size(), 1U);
+  EXPECT_EQ(run.timings[0].ticks, 100U);
+  EXPECT_EQ(run.usage(), std::nullopt);
 }
 
 TEST_F(SweepFile, IsOnePlainFileOnceItIsFinished) {

@@ -71,7 +71,10 @@ inline record::StoredRun two_channel_run(std::size_t points) {
                            .skipped = i == 2 ? 3U : 0U,
                            .resettles = 0,
                            .max_lateness_ns = 20000 + 1000 * i,
-                           .lateness_us = "8000 900 90 9 1"});
+                           .lateness_us = "8000 900 90 9 1",
+                           .usage = ThreadUsage{.minor_faults = i == 0 ? 12U : 0U,
+                                                .major_faults = i == 0 ? 1U : 0U,
+                                                .involuntary_switches = i % 5}});
   }
   run.events = {{.tick = 18000,
                  .dwell = 2,

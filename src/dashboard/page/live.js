@@ -85,6 +85,8 @@ function takeLog(log) {
   const { timing, events } = page.runs[0];
   timing.f.push(...log.timing.f);
   timing.late_us.push(...log.timing.late_us);
+  timing.faults.push(...log.timing.faults);
+  timing.switches.push(...log.timing.switches);
   log.timing.histogram.forEach((n, i) => {
     timing.histogram[i] = (timing.histogram[i] || 0) + n;
   });
@@ -117,10 +119,12 @@ function withUnderWay(spec, gain) {
 // The small plots appear when there is something to show in them.
 function refreshSmall() {
   const extras = [...new Set(page.responses.flatMap(r => Object.keys(r.extra)))];
-  const late = page.runs[0].timing.late_us.some(v => v > 0);
+  const shown = ['late_us', 'faults', 'switches'].filter(key =>
+    page.runs[0].timing[key].some(v => v > 0),
+  );
   const signature = ['gain95', 'snr', 'distortion', 'amplitude', 'response']
     .filter(has)
-    .concat(extras, late ? 'late' : '')
+    .concat(extras, shown)
     .join();
   if (signature === live.small) return;
   live.small = signature;

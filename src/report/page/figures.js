@@ -270,4 +270,25 @@ function smallPlots(host) {
     });
     new Histogram(host, timed);
   }
+  // Of the loop's thread: both ought to be none.
+  for (const [id, title] of [
+    ['faults', 'Page faults of the loop in each dwell'],
+    ['switches', 'Involuntary switches of the loop in each dwell'],
+  ]) {
+    if (!timed.some(run => run.timing[id].some(v => v > 0))) continue;
+    new Plot(host, {
+      id,
+      height: 200,
+      log: true,
+      title: () => title,
+      unit: () => '',
+      layers: () =>
+        timed.map((run, n) => ({
+          style: `--c:var(--s${n % 6})`,
+          f: run.timing.f,
+          y: run.timing[id],
+          bars: true,
+        })),
+    });
+  }
 }

@@ -1,0 +1,29 @@
+// What the whole process needs before its loop may run: memory that stays, a CPU that stays awake.
+#pragma once
+
+#include "realtime/rights.h"
+
+namespace sinerig::realtime {
+
+// Asks for memory, heap and idle states; gives memory and idle states back at its end. Nothing of
+// this can fail by an exception. One at a time.
+class ProcessRights {
+ public:
+  ProcessRights();
+  ~ProcessRights();
+  ProcessRights(const ProcessRights&) = delete;
+  ProcessRights& operator=(const ProcessRights&) = delete;
+
+  const Grants& grants() const { return grants_; }
+
+ private:
+  Grant keep_heap();
+  Grant lock_memory();
+  Grant hold_latency();
+
+  int latency_fd_ = -1;
+  bool locked_ = false;
+  Grants grants_;
+};
+
+}  // namespace sinerig::realtime

@@ -1,0 +1,99 @@
+#include "realtime/remedies.h"
+
+#include <filesystem>
+#include <fstream>
+#include <pwd.h>
+#include <unistd.h>
+
+#include <linux/capability.h>
+#include <sys/syscall.h>
+
+namespace sinerig::realtime {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+// "0::/system.slice/sinerig@gimbal.service" → "sinerig@gimbal.service"; empty for others.
+std::string unit_of_this_process() {
+  std::ifstream file{"/proc/self/cgroup"};
+  for (std::string line; std::getline(file, line);) {
+    const std::size_t slice = line.find("/system.slice/");
+    if (slice == std::string::npos || !line.ends_with(".service")) continue;
+    return line.substr(line.rfind('/') + 1);
+  }
+  return {};
+}
+
+std::string user_name() {
+  const passwd* entry = getpwuid(geteuid());
+  return entry == nullptr ? std::to_string(geteuid()) : entry->pw_name;
+}
+
+std::string limit(const Starter& starter, const char* item, const char* value) {
+  return "echo '" + starter.name + " - " + item + ' ' + value +
+         "' | sudo tee -a /etc/security/limits.d/90-sinerig.conf, then log in again";
+}
+
+std::string unit_line(const Starter& starter, const char* line) {
+  return "sudo systemctl edit " + starter.name + ": under [Service] " + line;
+}
+
+}  // namespace
+
+Starter starter() {
+  if (fs::exists("/.dockerenv") || fs::exists("/run/.containerenv"))
+    return {.kind = Starter::Kind::container, .name = user_name()};
+  const std::string unit = unit_of_this_process();
+  if (!unit.empty()) return {.kind = Starter::Kind::service, .name = unit};
+  return {.kind = Starter::Kind::person, .name = user_name()};
+}
+
+std::string allow_priority(const Starter& starter) {
+  switch (starter.kind) {
+    case Starter::Kind::service: return unit_line(starter, "LimitRTPRIO=99");
+    case Starter::Kind::container:
+      return "start the container with --cap-add SYS_NICE --ulimit rtprio=99";
+    case Starter::Kind::person: return limit(starter, "rtprio", "99");
+  }
+  return {};
+}
+
+std::string allow_locked_memory(const Starter& starter) {
+  switch (starter.kind) {
+    case Starter::Kind::service: return unit_line(starter, "LimitMEMLOCK=infinity");
+    case Starter::Kind::container:
+      return "start the container with --cap-add IPC_LOCK --ulimit memlock=-1";
+    case Starter::Kind::person: return limit(starter, "memlock", "unlimited");
+  }
+  return {};
+}
+
+std::string allow_cpu_latency(const Starter& starter) {
+  switch (starter.kind) {
+    case Starter::Kind::service:
+      return unit_line(starter, "ExecStartPre=+/bin/chmod 0666 /dev/cpu_dma_latency");
+    case Starter::Kind::container: return "start the container with --device /dev/cpu_dma_latency";
+    case Starter::Kind::person:
+      return "echo 'KERNEL==\"cpu_dma_latency\", OWNER=\"" + starter.name +
+             "\"' | sudo tee /etc/udev/rules.d/90-sinerig.rules, then sudo udevadm trigger "
+             "/dev/cpu_dma_latency";
+  }
+  return {};
+}
+
+std::string program_path() {
+  std::error_code ignored;
+  const fs::path path = fs::read_symlink("/proc/self/exe", ignored);
+  return path.empty() ? "sinerig" : path.string();
+}
+
+bool has_capability(int capability) {
+  __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
+  __user_cap_data_struct data[_LINUX_CAPABILITY_U32S_3] = {};
+  if (syscall(SYS_capget, &header, data) != 0) return false;
+  const auto index = static_cast<std::size_t>(CAP_TO_INDEX(capability));
+  return (data[index].effective & CAP_TO_MASK(capability)) != 0;
+}
+
+}  // namespace sinerig::realtime

@@ -1,0 +1,36 @@
+#include "realtime/rights.h"
+
+#include <algorithm>
+#include <iterator>
+
+namespace sinerig::realtime {
+
+const char* to_string(Right right) noexcept {
+  switch (right) {
+    case Right::scheduling: return "scheduling";
+    case Right::cpu: return "cpu";
+    case Right::memory: return "memory";
+    case Right::heap: return "heap";
+    case Right::idle_states: return "idle_states";
+    case Right::timer_slack: return "timer_slack";
+  }
+  return "unknown";
+}
+
+Grants missing(const Grants& grants) {
+  Grants found;
+  std::copy_if(grants.begin(), grants.end(), std::back_inserter(found),
+               [](const Grant& grant) { return !grant.granted; });
+  return found;
+}
+
+std::string describe_missing(const Grants& grants, const std::string& indent) {
+  std::string text;
+  for (const Grant& grant : missing(grants)) {
+    text += '\n' + indent + to_string(grant.right) + ": " + grant.state;
+    if (!grant.remedy.empty()) text += "; " + grant.remedy;
+  }
+  return text;
+}
+
+}  // namespace sinerig::realtime
