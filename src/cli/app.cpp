@@ -18,7 +18,7 @@
 #include "cli/notch_command.h"
 #include "cli/run_arguments.h"
 #include "config/section.h"
-#include "record/database.h"
+#include "record/file_lock.h"
 #include "version.h"
 
 namespace sinerig::cli {
@@ -32,6 +32,7 @@ constexpr const char* description =
     "  sinerig plan config/gimbal.toml     what would be run, and for how long; nothing moves\n"
     "  sinerig check config/gimbal.toml    reads every channel for a while; nothing moves\n"
     "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
+    "  sinerig resume gimbal.sweep         go on with it, should it have been interrupted\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
     "  sinerig export gimbal.sweep --format mat -o gimbal.mat\n"
@@ -123,6 +124,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   CLI::App* plan = add_plan(app, plan_options);
   RunOptions run_options;
   CLI::App* run = add_run(app, run_options);
+  ResumeOptions resume_options;
+  CLI::App* resume = add_resume(app, resume_options);
   ShowOptions show_options;
   CLI::App* show = add_show(app, show_options);
   ExportOptions export_options;
@@ -155,13 +158,15 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     return app.exit(error) == 0 ? exit_done : exit_usage;
   }
   set_up_logging(log_level);
-  const bool hushed = run_options.voice != Voice::text || compare_options.voice == Voice::quiet;
+  const bool hushed = run_options.voice != Voice::text || resume_options.voice != Voice::text ||
+                      compare_options.voice == Voice::quiet;
   if (hushed && log_level.empty()) spdlog::set_level(spdlog::level::warn);
 
   try {
     if (plan->parsed()) return plan_command(plan_options, drivers);
     if (check->parsed()) return check_command(check_options, drivers);
     if (run->parsed()) return run_command(run_options, drivers);
+    if (resume->parsed()) return resume_command(resume_options, drivers);
     if (show->parsed()) return show_command(show_options);
     if (exporter->parsed()) return export_command(export_options);
     if (reporter->parsed()) return report_command(report_options);
@@ -182,6 +187,9 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     spdlog::error("{}", error.what());
     return exit_usage;
   } catch (const record::FileExists& error) {
+    spdlog::error("{}", error.what());
+    return exit_usage;
+  } catch (const record::FileInUse& error) {
     spdlog::error("{}", error.what());
     return exit_usage;
   } catch (const InputError& error) {

@@ -36,6 +36,14 @@ struct RunOptions {
   std::optional<std::string> serve = {};  // ADDR:PORT of the live page; empty: the default
 };
 
+struct ResumeOptions {
+  std::string file;
+  bool report = true;
+  bool table = true;  // print the points at the end
+  Voice voice = Voice::text;
+  std::optional<std::string> serve = {};  // as RunOptions::serve
+};
+
 struct PlanOptions {
   std::string rig;
   bool json = false;
@@ -81,6 +89,8 @@ struct CompareOptions {
 };
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
+// Goes on with the interrupted run of a sweep file.
+int resume_command(const ResumeOptions& options, const std::vector<DriverKit>& drivers);
 int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drivers);
 int show_command(const ShowOptions& options);
 int check_command(const CheckOptions& options, const std::vector<DriverKit>& drivers);

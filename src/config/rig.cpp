@@ -287,6 +287,7 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   rig.runner.max_gap_s = loop.number("max_gap_s", {.min = 0.001, .max = 3600.0}, 1.0);
   if (const auto output = file->find("output")) {
     rig.runner.record_samples = output->flag("samples", false);
+    rig.max_lag_s = output->number("max_lag_s", {.min = 0.01, .max = 3600.0}, rig.max_lag_s);
   }
   for (std::size_t i = 0; i < rig.sensors.size(); ++i) {
     if (rig.sensors[i].section.flag("readback", false)) rig.runner.readbacks.push_back(i);

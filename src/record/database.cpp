@@ -33,6 +33,10 @@ void Database::execute(const std::string& sql) {
   }
 }
 
+bool Database::in_transaction() const {
+  return sqlite3_get_autocommit(handle_) == 0;
+}
+
 std::int64_t Database::pragma(const std::string& name) {
   Statement statement{*this, "PRAGMA " + name};
   return statement.step() ? statement.integer(0) : 0;
@@ -50,6 +54,11 @@ Statement::~Statement() {
 
 void Statement::check(int code) const {
   if (code != SQLITE_OK) database_.fail("a value cannot be stored");
+}
+
+// What a failed step left behind has been said already.
+void Statement::reset() noexcept {
+  sqlite3_reset(handle_);
 }
 
 void Statement::bind_one(int index, double value) {

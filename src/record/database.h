@@ -38,6 +38,7 @@ class Statement {
   // NaN is stored as NULL: SQLite has no NaN.
   template <typename... Values>
   Statement& bind(const Values&... values) {
+    reset();
     int index = 0;
     (bind_one(++index, values), ...);
     return *this;
@@ -62,6 +63,7 @@ class Statement {
     bind_one(index, static_cast<std::int64_t>(value));
   }
   void check(int code) const;
+  void reset() noexcept;
 
   Database& database_;
   sqlite3_stmt* handle_ = nullptr;
@@ -78,6 +80,7 @@ class Database {
 
   void execute(const std::string& sql);  // any number of statements, no results
   std::int64_t pragma(const std::string& name);
+  bool in_transaction() const;
 
   sqlite3* handle() const { return handle_; }
   [[noreturn]] void fail(const std::string& what) const;

@@ -24,6 +24,11 @@ class Leveller {
   std::optional<double> retry(const Point& point, double scale,
                               double planned_amplitude) noexcept SINERIG_NONBLOCKING;
 
+  // A point of an earlier part of this sweep that stood.
+  void recall(const Point& point) noexcept {
+    if (level_.wanted()) learn(point);
+  }
+
  private:
   struct Gain {
     double log_frequency = 0.0;

@@ -233,6 +233,7 @@ void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
   given_up_ = dwell_ticks_ >= max_dwell_stretch * dwell.max_samples;
   if (!measurement_.done() && !given_up_) return;
   measurement_.conclude();
+  put_lessons();
   if (try_again()) return;
   finish_dwell();
   attempt_ = 0;
@@ -242,12 +243,13 @@ void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
 }
 
 // One more dwell where the response between two points is not known.
-void SweepRunner::refine() noexcept {
+void SweepRunner::refine(bool tell) noexcept {
   if (dwells_.size() == plan_.dwells.size() + plan_.refinement.most_points) return;
   const double disagreement_db = refiner_.worst_db();
   const std::optional<std::size_t> candidate = refiner_.next();
   if (!candidate) return;
   dwells_.push_back(&plan_.refinement.candidates[*candidate]);  // within what was reserved
+  if (!tell) return;
   announce({.kind = EventKind::refined,
             .dwell = dwell_,
             .tick = last_tick_,
@@ -331,6 +333,47 @@ void SweepRunner::check_excitation(std::uint64_t tick) noexcept {
                        excitation_.commanded(0), tone_power, measurement_.block_power(1 + sensor)),
         static_cast<std::uint32_t>(sensor));
   }
+}
+
+void SweepRunner::put_lessons() noexcept {
+  for (std::size_t pair = 0; pair < measurement_.pairs().size(); ++pair) {
+    for (std::size_t tone = 0; tone < dwells_[dwell_]->tones.size(); ++tone) {
+      std::optional<Lesson> lesson = measurement_.lesson(pair, tone);
+      if (!lesson) continue;
+      lesson->dwell = dwell_;
+      lesson->attempt = attempt_;
+      sink_.put(*lesson);
+    }
+  }
+}
+
+bool SweepRunner::go_on(const FinishedDwells& finished) {
+  auto point = finished.points.begin();
+  auto lesson = finished.lessons.begin();
+  while (dwell_ < finished.dwells && dwell_ < dwells_.size()) {
+    const Dwell& dwell = *dwells_[dwell_];
+    for (; lesson != finished.lessons.end() && lesson->dwell <= dwell_; ++lesson) {
+      measurement_.recall(*lesson, dwell);
+    }
+    for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
+      const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
+      for (; point != finished.points.end() && point->dwell == dwell_ && point->tone == tone;
+           ++point) {
+        if (point->pair == 0 && tone == 0) leveller_.recall(*point);
+        if (refining && point->status == PointStatus::good) {
+          refiner_.set(point->pair, point->response, point->covariance.mean_variance());
+        }
+      }
+      if (refining) refiner_.learn();
+    }
+    ++dwell_;
+    ++outcome_.dwells_done;
+    if (dwell_ == dwells_.size()) refine(dwell_ >= finished.known_dwells);
+  }
+  for (; lesson != finished.lessons.end() && dwell_ < dwells_.size(); ++lesson) {
+    measurement_.recall(*lesson, *dwells_[dwell_]);
+  }
+  return dwell_ < dwells_.size();
 }
 
 void SweepRunner::finish_dwell() noexcept {

@@ -42,12 +42,28 @@ struct RunOutcome {
   std::uint64_t skipped_ticks = 0;
 };
 
+// What an earlier, interrupted run of the same plan has left.
+struct FinishedDwells {
+  std::uint32_t dwells = 0;        // finished, from the first on: the run goes on with the next
+  std::vector<Point> points;       // theirs, of all tones and responses
+  std::vector<Lesson> lessons;     // in the order in which they were taught
+  std::uint32_t known_dwells = 0;  // dwells that are on record, those added by refinement included
+};
+
 class SweepRunner {
  public:
   // All memory of the loop is taken here. The actuator, sensors, clock, guard and sink must outlive
   // the runner; `plan` is copied.
   SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, Actuator& actuator,
               std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink);
+
+  // Before run(): goes on behind the finished dwells instead of beginning with the first, knowing
+  // what they have taught: level, refinement, colour of the noise, size of the transient. False
+  // when there is nothing left to measure.
+  bool go_on(const FinishedDwells& finished);
+
+  // Of the plan, and those that refinement has added so far.
+  const std::vector<const Dwell*>& dwells() const noexcept { return dwells_; }
 
   // Runs to the end of the plan, a trip of the guard or a stop request. The actuator is released on
   // every way out.
@@ -63,7 +79,8 @@ class SweepRunner {
   void check_excitation(std::uint64_t tick) noexcept;
   bool try_again() noexcept;
   void finish_dwell() noexcept;
-  void refine() noexcept;
+  void put_lessons() noexcept;
+  void refine(bool tell = true) noexcept;
   Point make_point(std::size_t pair, std::size_t tone) const noexcept;
   void account(const Tick& tick, std::uint64_t ticks) noexcept;
   void note_sensor(std::size_t sensor, const Sample& sample, std::uint64_t tick) noexcept;
