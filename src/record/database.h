@@ -71,6 +71,7 @@ class Statement {
 
 class Database {
  public:
+  // A file to be read is written to only where a process that was killed left it half written.
   enum class Mode { read, write, create };
 
   Database(const std::string& path, Mode mode);
@@ -86,6 +87,8 @@ class Database {
   [[noreturn]] void fail(const std::string& what) const;
 
  private:
+  void open(int flags);
+
   std::string path_;
   sqlite3* handle_ = nullptr;
 };

@@ -9,7 +9,7 @@
 #include <sys/utsname.h>
 
 #include "record/schema.h"
-#include "record/unfinished_run.h"
+#include "record/sweep_path.h"
 #include "version.h"
 
 namespace sinerig::record {
@@ -23,43 +23,6 @@ std::string utc_now() {
   char text[32];
   std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
   return text;
-}
-
-void remove_all_of(const std::string& path) {
-  std::error_code not_there;
-  for (const char* suffix : {"", "-wal", "-shm", "-journal", "-spare"}) {
-    std::filesystem::remove(path + suffix, not_there);
-  }
-}
-
-void refuse_in_use(const std::string& path) {
-  try {
-    const FileLock nobody_writes{path, file_in_use};
-  } catch (const FileInUse&) {
-    throw;
-  } catch (const SweepFileError&) {
-    // Not ours to write: then it is not ours to resume either.
-  }
-}
-
-// Makes the path free to be created.
-void make_way(const std::string& path, SweepWriter::IfExists if_exists) {
-  if (!std::filesystem::exists(path)) {
-    // The log of a file that somebody removed by hand is not that of the new one.
-    remove_all_of(path);
-    return;
-  }
-  if (if_exists == SweepWriter::IfExists::refuse) {
-    refuse_in_use(path);
-    const std::string resumable =
-        can_be_resumed(path)
-            ? ", and its run was interrupted: `sinerig resume " + path + "` goes on with it"
-            : "";
-    throw FileExists(path + ": exists already" + resumable +
-                     "; choose another name with -o, or --force to replace it");
-  }
-  const FileLock nobody_writes{path, file_in_use};
-  remove_all_of(path);
 }
 
 std::string exact(double value) {
@@ -109,7 +72,7 @@ struct SweepWriter::Statements {
 
 SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists if_exists)
     : path_{path}, candidates_{info.plan.refinement.candidates}, created_{true} {
-  make_way(path, if_exists);
+  make_way(path, if_exists == IfExists::replace);
   database_ = std::make_unique<Database>(path, Database::Mode::create);
   try {
     open(info);
@@ -220,7 +183,7 @@ void SweepWriter::finish() {
 }
 
 void SweepWriter::discard() {
-  if (created_) remove_all_of(path_);
+  if (created_) remove_sweep_file(path_);
 }
 
 void SweepWriter::set(const std::string& key, const std::string& value) {

@@ -6,6 +6,8 @@
 #include <numbers>
 #include <ostream>
 
+#include "report/run_parts.h"
+
 namespace sinerig::report {
 
 namespace {
@@ -171,6 +173,11 @@ void print_head(std::ostream& stream, const record::StoredRun& run) {
   stream << text("loop     %llu ticks, %llu skipped, %.1f µs late at most\n",
                  static_cast<unsigned long long>(ticks), static_cast<unsigned long long>(skipped),
                  static_cast<double>(max_lateness_ns) * 1e-3);
+  const std::string disk = disk_text(run);
+  if (!disk.empty()) stream << "disk     " << disk << '\n';
+  const std::vector<std::string> parts = part_texts(run);
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    stream << text("part %-3zu ", i + 1) << parts[i] << '\n';
 }
 
 }  // namespace
