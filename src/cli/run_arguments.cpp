@@ -72,6 +72,22 @@ CLI::App* add_resume(CLI::App& app, ResumeOptions& options) {
   return resume;
 }
 
+CLI::App* add_night(CLI::App& app, NightOptions& options) {
+  CLI::App* night = app.add_subcommand(
+      "night",
+      "Run the sweeps of a job file one after the other, and tell what changed between repeats. "
+      "Called again after an interruption it goes on where it was");
+  night->add_option("JOB", options.job, "job file (TOML)")->required();
+  CLI::Option* quiet = night->add_flag_callback(
+      "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");
+  night
+      ->add_flag_callback(
+          "--json", [&options] { options.voice = Voice::json; },
+          "print one JSON object per line: sweep, plan, points, end, and at last the night")
+      ->excludes(quiet);
+  return night;
+}
+
 std::vector<std::string> arguments_of(int argc, char** argv) {
   std::vector<std::string> arguments{argv + 1, argv + argc};
   for (std::size_t i = 0; i + 1 < arguments.size(); ++i) {
