@@ -20,6 +20,15 @@ Tables tables_of(Database& database) {
   return tables;
 }
 
+// A run that was killed before its plan was on the disk leaves a database with nothing in it.
+void refuse_not_begun(const std::string& path) {
+  Database database{path, Database::Mode::read};
+  if (!tables_of(database).empty()) return;
+  throw SweepFileError(path +
+                       ": is not a sweep file, or one whose run was killed before it began: "
+                       "there is nothing to resume");
+}
+
 void refuse_other_layout(const std::string& path, Database& database) {
   Database fresh{":memory:", Database::Mode::create};
   fresh.execute(schema_sql);
@@ -145,6 +154,7 @@ bool same(const Dwell& a, const Dwell& b) {
 }  // namespace
 
 UnfinishedRun read_unfinished(const std::string& path) {
+  refuse_not_begun(path);
   UnfinishedRun run{.stored = read_sweep(path), .finished = {}, .start = {}};
   Database database{path, Database::Mode::read};
   refuse_other_layout(path, database);

@@ -1,7 +1,7 @@
 #include "crash/faulty_disk.h"
 
 #include <algorithm>
-#include <atomic>
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <cstring>
@@ -11,6 +11,7 @@
 #include <mutex>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 #include <unistd.h>
 #include <vector>
 
@@ -36,7 +37,9 @@ struct Cached {
 struct Disk {
   std::mutex mutex;
   std::uint64_t operations = 0;
-  std::uint64_t kill_at = 0;  // 0: never
+  std::uint64_t kill_at = 0;   // 0: never
+  std::uint64_t fails_at = 0;  // 0: never
+  std::chrono::milliseconds sync_time{0};
   bool power = false;
   bool limited = false;
   std::uint64_t room = 0;
@@ -65,6 +68,10 @@ File& file_of(sqlite3_file* file) {
 
 bool last_operation() {
   return ++disk().operations == disk().kill_at;
+}
+
+bool read_only() {
+  return disk().fails_at > 0 && disk().operations >= disk().fails_at;
 }
 
 [[noreturn]] void die() {
@@ -116,6 +123,7 @@ int write_file(sqlite3_file* base, const void* from, int size, sqlite3_int64 off
     if (!all.power) file.real()->pMethods->xWrite(file.real(), from, size / 2, offset);
     die();
   }
+  if (read_only()) return SQLITE_IOERR_WRITE;
   if (all.limited && all.grown + growth > all.room) {
     if (!all.spare_counted && !all.spare.empty() && access(all.spare.c_str(), F_OK) != 0) {
       all.spare_counted = true;
@@ -161,6 +169,8 @@ int sync_file(sqlite3_file* base, int flags) {
     unsynced.clear();
   }
   if (last) die();
+  if (read_only()) return SQLITE_IOERR_FSYNC;
+  std::this_thread::sleep_for(disk().sync_time);
   return file.real()->pMethods->xSync(file.real(), flags);
 }
 
@@ -270,6 +280,10 @@ void install_faulty_disk(const std::string& orders) {
       std::atexit(write_count);
     } else if (name == "kill") {
       all.kill_at = std::stoull(value);
+    } else if (name == "fails") {
+      all.fails_at = std::stoull(value);
+    } else if (name == "slow") {
+      all.sync_time = std::chrono::milliseconds{std::stoll(value)};
     } else if (name == "power") {
       all.power = true;
     } else if (name == "full") {
