@@ -30,15 +30,15 @@ SweepPlan levelled_plan() {
   return plan_sweep(sweep, {}, 200.0);
 }
 
-struct Run {
+struct Measured {
   CollectingSink sink;
   RunOutcome outcome;
   bool to_measure = true;
   std::size_t dwells = 0;
 };
 
-Run run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells& finished) {
-  Run run;
+Measured run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells& finished) {
+  Measured run;
   VirtualClock clock{TickGrid{plan.rate_hz}};
   const sim::SimulatedRigSettings settings = resonant_rig(noise_rms);
   sim::SimulatedRig rig{settings, clock};
@@ -53,7 +53,7 @@ Run run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells& fini
 }
 
 // What a file would hold of the first dwells of a run.
-FinishedDwells first_of(const Run& run, std::uint32_t dwells, std::uint32_t known) {
+FinishedDwells first_of(const Measured& run, std::uint32_t dwells, std::uint32_t known) {
   FinishedDwells finished{.dwells = dwells, .points = {}, .lessons = {}, .known_dwells = known};
   for (const Point& point : run.sink.points) {
     if (point.dwell < dwells) finished.points.push_back(point);
@@ -64,7 +64,7 @@ FinishedDwells first_of(const Run& run, std::uint32_t dwells, std::uint32_t know
   return finished;
 }
 
-std::vector<std::uint32_t> refined(const Run& run) {
+std::vector<std::uint32_t> refined(const Measured& run) {
   std::vector<std::uint32_t> candidates;
   for (const Event& event : run.sink.events) {
     if (event.kind == EventKind::refined) candidates.push_back(event.candidate);
@@ -76,11 +76,11 @@ class GoingOn : public testing::TestWithParam<std::uint32_t> {};
 
 TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
   const SweepPlan plan = levelled_plan();
-  const Run whole = run_from(plan, 0.0, {});
+  const Measured whole = run_from(plan, 0.0, {});
   ASSERT_FALSE(whole.outcome.trip.tripped());
   ASSERT_GT(whole.dwells, plan.dwells.size()) << "nothing was refined";
   const std::uint32_t kept = GetParam();
-  const Run rest = run_from(plan, 0.0, first_of(whole, kept, kept));
+  const Measured rest = run_from(plan, 0.0, first_of(whole, kept, kept));
   EXPECT_EQ(rest.outcome.dwells_done, whole.outcome.dwells_done);
   ASSERT_EQ(rest.sink.points.size(), whole.sink.points.size() - kept);
   for (std::size_t i = 0; i < rest.sink.points.size(); ++i) {
@@ -96,15 +96,15 @@ TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
 
 INSTANTIATE_TEST_SUITE_P(Dwells, GoingOn, testing::Values(0U, 1U, 2U, 7U, 12U, 13U));
 
-TEST(GoingOn, BeginsWithExactlyWhatWasLearnt) {
+TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   const SweepPlan plan = levelled_plan();
-  const Run whole = run_from(plan, 0.01, {});
+  const Measured whole = run_from(plan, 0.01, {});
   ASSERT_GE(whole.sink.lessons.size(), 12U);
   // The amplitude of the first attempt follows from the recalled points alone, to the last bit.
-  const Run rest = run_from(plan, 0.01, first_of(whole, 8, 8));
-  const auto amplitude_of = [](const Run& run) {
+  const Measured rest = run_from(plan, 0.01, first_of(whole, 8, 8));
+  const auto amplitude_of = [](const Measured& run) {
     for (const Block& block : run.sink.blocks) {
-      if (block.dwell == 8 && block.channel == applied_channel) return block.coefficients.b;
+      if (block.dwell == 8 && block.channel == applied_channel) return std::abs(block.coefficients.phasor());
     }
     return 0.0;
   };
@@ -113,13 +113,13 @@ TEST(GoingOn, BeginsWithExactlyWhatWasLearnt) {
   // Without the lessons the colour of the noise would have to be learnt anew.
   FinishedDwells forgetful = first_of(whole, 8, 8);
   forgetful.lessons.clear();
-  const Run again = run_from(plan, 0.01, forgetful);
+  const Measured again = run_from(plan, 0.01, forgetful);
   EXPECT_GT(rest.sink.points.front().dof, again.sink.points.front().dof);
 }
 
-TEST(GoingOn, ChoosesTheSameRefinementsAndTellsOnlyOfNewOnes) {
+TEST(RestOfASweep, ChoosesTheSameRefinementsAndTellsOnlyOfNewOnes) {
   const SweepPlan plan = levelled_plan();
-  const Run whole = run_from(plan, 0.0, {});
+  const Measured whole = run_from(plan, 0.0, {});
   const std::vector<std::uint32_t> all = refined(whole);
   ASSERT_GE(all.size(), 2U);
   // The first pass is done; the first added dwell may or may not have reached the file.
@@ -129,11 +129,11 @@ TEST(GoingOn, ChoosesTheSameRefinementsAndTellsOnlyOfNewOnes) {
             all[1]);
 }
 
-TEST(GoingOn, KnowsWhenNothingIsLeft) {
+TEST(RestOfASweep, KnowsWhenNothingIsLeft) {
   const SweepPlan plan = levelled_plan();
-  const Run whole = run_from(plan, 0.0, {});
+  const Measured whole = run_from(plan, 0.0, {});
   const auto all = static_cast<std::uint32_t>(whole.dwells);
-  const Run rest = run_from(plan, 0.0, first_of(whole, all, all));
+  const Measured rest = run_from(plan, 0.0, first_of(whole, all, all));
   EXPECT_FALSE(rest.to_measure);
   EXPECT_TRUE(rest.sink.events.empty());
 }
