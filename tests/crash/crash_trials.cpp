@@ -223,7 +223,9 @@ void Trials::trial(Mode mode, Tally& tally) {
   tally.dwells_kept += before.finished;
   if (before.outcome != "done") ++parts;
   end = run_child(SINERIG_BINARY, arguments("resume"), folder_, "", {});
-  if (end.code != 0) tally.failures.push_back("resume: " + end.errors);
+  if (end.code != 0) {
+    tally.failures.push_back("resume: exit code " + std::to_string(end.code) + ": " + end.errors);
+  }
   look_at(before, parts, tally);
 }
 
