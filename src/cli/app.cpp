@@ -18,7 +18,7 @@
 #include "cli/notch_command.h"
 #include "cli/run_arguments.h"
 #include "config/section.h"
-#include "record/database.h"
+#include "record/file_lock.h"
 #include "version.h"
 
 namespace sinerig::cli {
@@ -33,6 +33,8 @@ constexpr const char* description =
     "  sinerig check config/gimbal.toml    reads every channel for a while; nothing moves\n"
     "  sinerig doctor                      what this machine gives a loop in real time\n"
     "  sinerig run config/gimbal.toml      run it; leaves gimbal.sweep and gimbal.html\n"
+    "  sinerig resume gimbal.sweep         go on with it, should it have been interrupted\n"
+    "  sinerig night night.toml            several sweeps one after the other\n"
     "  sinerig show gimbal.sweep           the points of a run\n"
     "  sinerig report gimbal.sweep         the report again, or as a picture with --format svg\n"
     "  sinerig export gimbal.sweep --format mat -o gimbal.mat\n"
@@ -43,7 +45,8 @@ constexpr const char* description =
 
 constexpr const char* footer =
     "Exit codes: 0 done, 1 failed, 2 usage or configuration, 3 stopped by a limit or a fault,\n"
-    "4 interrupted, 5 compare found a change. Every key of a rig file is explained in the files of "
+    "4 interrupted, 5 compare or night found a change. Every key of a rig file is explained in the "
+    "files of "
     "config/.";
 
 CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
@@ -124,6 +127,10 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   CLI::App* plan = add_plan(app, plan_options);
   RunOptions run_options;
   CLI::App* run = add_run(app, run_options);
+  ResumeOptions resume_options;
+  CLI::App* resume = add_resume(app, resume_options);
+  NightOptions night_options;
+  CLI::App* night = add_night(app, night_options);
   ShowOptions show_options;
   CLI::App* show = add_show(app, show_options);
   ExportOptions export_options;
@@ -158,7 +165,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     return app.exit(error) == 0 ? exit_done : exit_usage;
   }
   set_up_logging(log_level);
-  const bool hushed = run_options.voice != Voice::text || compare_options.voice == Voice::quiet;
+  const bool hushed = run_options.voice != Voice::text || night_options.voice != Voice::text ||
+                      resume_options.voice != Voice::text || compare_options.voice == Voice::quiet;
   if (hushed && log_level.empty()) spdlog::set_level(spdlog::level::warn);
 
   try {
@@ -166,6 +174,8 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     if (check->parsed()) return check_command(check_options, drivers);
     if (doctor->parsed()) return doctor_command(doctor_options);
     if (run->parsed()) return run_command(run_options, drivers);
+    if (resume->parsed()) return resume_command(resume_options, drivers);
+    if (night->parsed()) return night_command(night_options, drivers);
     if (show->parsed()) return show_command(show_options);
     if (exporter->parsed()) return export_command(export_options);
     if (reporter->parsed()) return report_command(report_options);
@@ -186,6 +196,9 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     spdlog::error("{}", error.what());
     return exit_usage;
   } catch (const record::FileExists& error) {
+    spdlog::error("{}", error.what());
+    return exit_usage;
+  } catch (const record::FileInUse& error) {
     spdlog::error("{}", error.what());
     return exit_usage;
   } catch (const InputError& error) {

@@ -17,7 +17,7 @@ enum ExitCode : int {
   exit_usage = 2,        // usage or configuration
   exit_stopped = 3,      // by a limit or a fault
   exit_interrupted = 4,  // by the user; resumable
-  exit_changed = 5,      // compare: at least one point differs
+  exit_changed = 5,      // compare, night: at least one point differs
 };
 
 // What a command says on standard output.
@@ -34,6 +34,20 @@ struct RunOptions {
   bool report = true;                     // write NAME.html at the end
   Voice voice = Voice::text;              // json: one object per line, plan, points, end
   std::optional<std::string> serve = {};  // ADDR:PORT of the live page; empty: the default
+};
+
+struct ResumeOptions {
+  std::string file;
+  bool report = true;
+  bool table = true;  // print the points at the end
+  Voice voice = Voice::text;
+  std::optional<std::string> serve = {};  // as RunOptions::serve
+};
+
+struct NightOptions {
+  std::string job;
+  Voice voice = Voice::text;  // json: the lines of each run, before it one of type sweep, at last
+                              // one of type night
 };
 
 struct PlanOptions {
@@ -88,6 +102,10 @@ struct CompareOptions {
 };
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers);
+// Goes on with the interrupted run of a sweep file.
+int resume_command(const ResumeOptions& options, const std::vector<DriverKit>& drivers);
+// The sweeps of a job file, one after the other; called again it goes on where it was.
+int night_command(const NightOptions& options, const std::vector<DriverKit>& drivers);
 int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drivers);
 int show_command(const ShowOptions& options);
 int check_command(const CheckOptions& options, const std::vector<DriverKit>& drivers);

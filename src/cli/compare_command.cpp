@@ -10,6 +10,7 @@
 #include "cli/drift_figures.h"
 #include "cli/output_file.h"
 #include "cli/report_file.h"
+#include "cli/run_differences.h"
 #include "record/measured.h"
 #include "report/comparison.h"
 #include "report/html.h"
@@ -20,7 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using record::Difference;
-using record::StoredResponse;
 
 // Two files of one name in different folders are told apart by their paths.
 std::string label_of(const std::string& file, const std::vector<std::string>& files) {
@@ -28,36 +28,6 @@ std::string label_of(const std::string& file, const std::vector<std::string>& fi
   for (const std::string& other : files)
     if (other != file && fs::path{other}.stem().string() == label) return file;
   return label;
-}
-
-const StoredResponse* same_response(const report::LabelledRun& run, const std::string& name) {
-  for (const StoredResponse& response : run.run.responses)
-    if (report::response_name(run.run, response) == name) return &response;
-  return nullptr;
-}
-
-// Each run after the first against the first, response by response of the same name. Two files
-// with one response each are compared whatever the names are.
-std::vector<Difference> differences_of(const std::vector<report::LabelledRun>& runs,
-                                       const record::CompareSettings& settings) {
-  std::vector<Difference> differences;
-  const report::LabelledRun& first = runs.front();
-  for (std::size_t i = 1; i < runs.size(); ++i) {
-    for (const StoredResponse& response : first.run.responses) {
-      const std::string name = report::response_name(first.run, response);
-      const bool single = first.run.responses.size() == 1 && runs[i].run.responses.size() == 1;
-      const StoredResponse* other =
-          single ? &runs[i].run.responses.front() : same_response(runs[i], name);
-      if (other == nullptr) {
-        spdlog::warn("{} has no response of {}: not compared", runs[i].label, name);
-        continue;
-      }
-      Difference difference = compare_responses(response, *other, settings);
-      difference.name = runs[i].label + " " + name;
-      differences.push_back(std::move(difference));
-    }
-  }
-  return differences;
 }
 
 }  // namespace

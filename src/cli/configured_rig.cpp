@@ -1,6 +1,7 @@
 #include "cli/configured_rig.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace sinerig::cli {
 
@@ -24,8 +25,9 @@ std::unique_ptr<Clock> make_clock(const config::Rig& rig) {
 
 }  // namespace
 
-ConfiguredRig::ConfiguredRig(const std::string& path, const std::vector<DriverKit>& drivers)
-    : rig_{config::read_rig(config::RigFile::load(path))}, clock_{make_clock(rig_)} {
+ConfiguredRig::ConfiguredRig(std::unique_ptr<config::RigFile> file,
+                             const std::vector<DriverKit>& drivers)
+    : rig_{config::read_rig(std::move(file))}, clock_{make_clock(rig_)} {
   driver_of(rig_.actuator, drivers);
   for (const config::Channel& sensor : rig_.sensors) driver_of(sensor, drivers);
   for (const DriverKit& driver : drivers) {

@@ -16,7 +16,9 @@ class ConfiguredRig final : public Rearm {
  public:
   // Reads the file, lets each driver read its keys, refuses every key that nobody knows.
   // Throws config::ConfigError.
-  ConfiguredRig(const std::string& path, const std::vector<DriverKit>& drivers);
+  ConfiguredRig(std::unique_ptr<config::RigFile> file, const std::vector<DriverKit>& drivers);
+  ConfiguredRig(const std::string& path, const std::vector<DriverKit>& drivers)
+      : ConfiguredRig{config::RigFile::load(path), drivers} {}
 
   const config::Rig& rig() const { return rig_; }
   Clock& clock() { return *clock_; }

@@ -6,6 +6,31 @@
 
 namespace sinerig::cli {
 
+namespace {
+
+// How `run` and `resume` are watched.
+template <typename Options>
+void add_telling(CLI::App& command, Options& options) {
+  command.add_flag_callback(
+      "--no-report", [&options] { options.report = false; },
+      "do not write the report NAME.html at the end");
+  const std::string address = dashboard::Address{}.text();
+  command.add_flag(
+      "--serve{" + address + "}", options.serve,
+      "show the run in a browser while it goes on, with a Stop button; --serve=ADDR:PORT "
+      "for elsewhere (default " +
+          address + ", for this machine only; port 0: any free one)");
+  CLI::Option* quiet = command.add_flag_callback(
+      "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");
+  command
+      .add_flag_callback(
+          "--json", [&options] { options.voice = Voice::json; },
+          "print one JSON object per line: plan, points, end")
+      ->excludes(quiet);
+}
+
+}  // namespace
+
 CLI::App* add_plan(CLI::App& app, PlanOptions& options) {
   CLI::App* plan = app.add_subcommand(
       "plan", "Print every dwell of a rig file and the total duration; refuse what can't be run");
@@ -49,21 +74,34 @@ CLI::App* add_run(CLI::App& app, RunOptions& options) {
       "-o,--output", options.output,
       "sweep file to write (default: RIG's name + .sweep, here; numbered when it exists)");
   run->add_flag("--force", options.force, "replace the sweep file if it exists");
-  run->add_flag_callback(
-      "--no-report", [&options] { options.report = false; },
-      "do not write the report NAME.html at the end");
-  const std::string address = dashboard::Address{}.text();
-  run->add_flag("--serve{" + address + "}", options.serve,
-                "show the run in a browser while it goes on, with a Stop button; --serve=ADDR:PORT "
-                "for elsewhere (default " +
-                    address + ", for this machine only; port 0: any free one)");
-  CLI::Option* quiet = run->add_flag_callback(
-      "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");
-  run->add_flag_callback(
-         "--json", [&options] { options.voice = Voice::json; },
-         "print one JSON object per line: plan, points, end")
-      ->excludes(quiet);
+  add_telling(*run, options);
   return run;
+}
+
+CLI::App* add_resume(CLI::App& app, ResumeOptions& options) {
+  CLI::App* resume = app.add_subcommand(
+      "resume",
+      "Go on with the run of a sweep file that was interrupted, stopped or killed: finished points "
+      "stay as they are, the dwell it was interrupted in is repeated");
+  resume->add_option("FILE", options.file, "sweep file; the rig file is in it")->required();
+  add_telling(*resume, options);
+  return resume;
+}
+
+CLI::App* add_night(CLI::App& app, NightOptions& options) {
+  CLI::App* night = app.add_subcommand(
+      "night",
+      "Run the sweeps of a job file one after the other, and tell what changed between repeats. "
+      "Called again after an interruption it goes on where it was");
+  night->add_option("JOB", options.job, "job file (TOML)")->required();
+  CLI::Option* quiet = night->add_flag_callback(
+      "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");
+  night
+      ->add_flag_callback(
+          "--json", [&options] { options.voice = Voice::json; },
+          "print one JSON object per line: sweep, plan, points, end, and at last the night")
+      ->excludes(quiet);
+  return night;
 }
 
 std::vector<std::string> arguments_of(int argc, char** argv) {

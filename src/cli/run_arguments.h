@@ -14,6 +14,8 @@ CLI::App* add_plan(CLI::App& app, PlanOptions& options);
 CLI::App* add_check(CLI::App& app, CheckOptions& options);
 CLI::App* add_doctor(CLI::App& app, DoctorOptions& options);
 CLI::App* add_run(CLI::App& app, RunOptions& options);
+CLI::App* add_night(CLI::App& app, NightOptions& options);
+CLI::App* add_resume(CLI::App& app, ResumeOptions& options);
 
 // The program's arguments for CLI11, last first. `--serve` may stand alone: what follows is its
 // address only when it looks like one.

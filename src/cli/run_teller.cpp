@@ -39,8 +39,9 @@ void print_line(const Json& json) {
 
 }  // namespace
 
-RunTeller::RunTeller(Voice voice, const config::Rig& rig, const SweepPlan& plan)
+RunTeller::RunTeller(Voice voice, bool table, const config::Rig& rig, const SweepPlan& plan)
     : voice_{voice},
+      table_{table},
       rig_{rig},
       plan_{plan},
       progress_{std::cout, style_of(voice), plan, terminal_columns()} {}
@@ -61,6 +62,10 @@ void RunTeller::plan(const std::string& live_page) {
                report::bench_time_text(plan_));
   // Quiet or not: without the token in it nobody could stop the run from the page.
   if (!live_page.empty()) std::cerr << "live page: " << live_page << std::endl;
+}
+
+void RunTeller::resume(const std::vector<Point>& points) {
+  progress_.resume(points);
 }
 
 void RunTeller::point(const Point& point) {
@@ -97,7 +102,8 @@ void RunTeller::end(const RunEnd& end) {
 }
 
 void RunTeller::end_in_words(const RunEnd& end) {
-  if (voice_ == Voice::text) report::print_run(std::cout, record::read_sweep(end.sweep_file));
+  if (voice_ == Voice::text && table_)
+    report::print_run(std::cout, record::read_sweep(end.sweep_file));
   std::cout.flush();  // before the messages on standard error
   if (!end.reason.empty()) spdlog::error("{}", end.reason);
   if (end.dropped_samples > 0) {

@@ -21,10 +21,13 @@ struct RunEnd {
 class RunTeller {
  public:
   // `rig` and `plan` must outlive it.
-  RunTeller(Voice voice, const config::Rig& rig, const SweepPlan& plan);
+  // With `table` the points are printed once more at the end.
+  RunTeller(Voice voice, bool table, const config::Rig& rig, const SweepPlan& plan);
 
   // What will be run; `live_page` is where it can be watched, empty where it can't.
   void plan(const std::string& live_page);
+  // Points of before an interruption, told already.
+  void resume(const std::vector<Point>& points);
   void point(const Point& point);
   void update(std::uint32_t dwell, std::uint64_t tick);
   // The loop has ended.
@@ -37,6 +40,7 @@ class RunTeller {
   void end_as_json(const RunEnd& end);
 
   Voice voice_;
+  bool table_;
   const config::Rig& rig_;
   const SweepPlan& plan_;
   report::Progress progress_;

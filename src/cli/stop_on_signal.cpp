@@ -16,7 +16,7 @@ void count_stop_request(int /*signal*/) {
 }  // namespace
 
 StopOnSignal::StopOnSignal(RunControl& control) {
-  running = &control;
+  outer_ = running.exchange(&control);
   struct sigaction action {};
   action.sa_handler = count_stop_request;
   sigaction(SIGINT, &action, &old_int_);
@@ -31,7 +31,7 @@ StopOnSignal::~StopOnSignal() {
   sigaction(SIGTERM, &old_term_, nullptr);
   sigaction(SIGHUP, &old_hup_, nullptr);
   sigaction(SIGPIPE, &old_pipe_, nullptr);
-  running = nullptr;
+  running = outer_;
 }
 
 }  // namespace sinerig::cli

@@ -7,7 +7,8 @@
 
 namespace sinerig::cli {
 
-// SIGINT, SIGTERM and SIGHUP become stop requests for as long as this lives; one at a time. A
+// SIGINT, SIGTERM and SIGHUP become stop requests for as long as this lives; of several the
+// innermost has them. A
 // reader of the output that goes away (SIGPIPE) is no reason to leave an actuator where it is.
 class StopOnSignal {
  public:
@@ -17,6 +18,7 @@ class StopOnSignal {
   StopOnSignal& operator=(const StopOnSignal&) = delete;
 
  private:
+  RunControl* outer_ = nullptr;
   struct sigaction old_int_ {};
   struct sigaction old_term_ {};
   struct sigaction old_hup_ {};

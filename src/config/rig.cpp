@@ -287,6 +287,7 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   if (const auto retry = file->find("retry")) rig.runner.retry = read_retry(*retry);
   if (const auto output = file->find("output")) {
     rig.runner.record_samples = output->flag("samples", false);
+    rig.max_lag_s = output->number("max_lag_s", {.min = 0.01, .max = 3600.0}, rig.max_lag_s);
   }
   for (std::size_t i = 0; i < rig.sensors.size(); ++i) {
     if (rig.sensors[i].section.flag("readback", false)) rig.runner.readbacks.push_back(i);

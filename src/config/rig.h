@@ -37,6 +37,7 @@ struct Rig {
   Channel actuator;
   std::vector<Channel> sensors{};
   RunnerSettings runner{};
+  double max_lag_s = 10.0;  // a finished point that is not on the disk for longer ends the run
 
   // The plan of this rig; PlanRefused becomes a ConfigError with file and line.
   SweepPlan plan() const;

@@ -223,6 +223,24 @@ std::vector<std::complex<double>> Section::roots(std::string_view key) const {
   return roots;
 }
 
+std::vector<std::pair<std::string, std::string>> Section::values() const {
+  std::vector<std::pair<std::string, std::string>> all;
+  const auto collect = [&](const auto& self, const toml::table& table,
+                           const std::string& path) -> void {
+    for (const auto& [key, node] : table) {
+      const std::string name = path + std::string{key.str()};
+      file_->read_.insert(name_ + "." + name);
+      if (const toml::table* inner = node.as_table()) {
+        self(self, *inner, name + ".");
+      } else {
+        all.emplace_back(name, value_text(node));
+      }
+    }
+  };
+  collect(collect, *node_->table, "");
+  return all;
+}
+
 std::optional<Section> Section::table(std::string_view key) const {
   if (!has(key)) return std::nullopt;
   const toml::node& node = Access::require(*this, key, "");

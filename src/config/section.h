@@ -12,6 +12,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace sinerig::config {
@@ -69,6 +70,10 @@ class Section {
 
   // Real numbers and [re, im] pairs.
   std::vector<std::complex<double>> roots(std::string_view key) const;
+
+  // All values of this table and of those in it, as TOML text, by their path: {"sweep.amplitude",
+  // "0.1"}. Nobody has to know the keys.
+  std::vector<std::pair<std::string, std::string>> values() const;
 
   // [section.key]; empty where the key is missing.
   std::optional<Section> table(std::string_view key) const;

@@ -8,13 +8,22 @@
 namespace sinerig::record {
 
 Database::Database(const std::string& path, Mode mode) : path_{path} {
-  const int flags = mode == Mode::read    ? SQLITE_OPEN_READONLY
-                    : mode == Mode::write ? SQLITE_OPEN_READWRITE
-                                          : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
-  if (sqlite3_open_v2(path.c_str(), &handle_, flags, nullptr) != SQLITE_OK) {
+  open(mode == Mode::read    ? SQLITE_OPEN_READONLY
+       : mode == Mode::write ? SQLITE_OPEN_READWRITE
+                             : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+  if (mode != Mode::read) return;
+  // A journal that a killed process left has to be rolled back before anything can be read.
+  const int code = sqlite3_exec(handle_, "PRAGMA schema_version", nullptr, nullptr, nullptr);
+  if ((code & 0xff) != SQLITE_READONLY) return;
+  sqlite3_close_v2(handle_);
+  open(SQLITE_OPEN_READWRITE);
+}
+
+void Database::open(int flags) {
+  if (sqlite3_open_v2(path_.c_str(), &handle_, flags, nullptr) != SQLITE_OK) {
     const std::string reason = handle_ != nullptr ? sqlite3_errmsg(handle_) : "out of memory";
     sqlite3_close(handle_);
-    throw SweepFileError(path + ": cannot be opened: " + reason);
+    throw SweepFileError(path_ + ": cannot be opened: " + reason);
   }
   sqlite3_busy_timeout(handle_, 5000);
 }
@@ -31,6 +40,10 @@ void Database::execute(const std::string& sql) {
   if (sqlite3_exec(handle_, sql.c_str(), nullptr, nullptr, nullptr) != SQLITE_OK) {
     fail("cannot be written");
   }
+}
+
+bool Database::in_transaction() const {
+  return sqlite3_get_autocommit(handle_) == 0;
 }
 
 std::int64_t Database::pragma(const std::string& name) {
@@ -50,6 +63,11 @@ Statement::~Statement() {
 
 void Statement::check(int code) const {
   if (code != SQLITE_OK) database_.fail("a value cannot be stored");
+}
+
+// What a failed step left behind has been said already.
+void Statement::reset() noexcept {
+  sqlite3_reset(handle_);
 }
 
 void Statement::bind_one(int index, double value) {

@@ -39,6 +39,7 @@ class Statement {
   // NaN is stored as NULL: SQLite has no NaN.
   template <typename... Values>
   Statement& bind(const Values&... values) {
+    reset();
     int index = 0;
     (bind_one(++index, values), ...);
     return *this;
@@ -66,6 +67,7 @@ class Statement {
     value ? bind_one(index, *value) : bind_one(index, std::nan(""));
   }
   void check(int code) const;
+  void reset() noexcept;
 
   Database& database_;
   sqlite3_stmt* handle_ = nullptr;
@@ -73,6 +75,7 @@ class Statement {
 
 class Database {
  public:
+  // A file to be read is written to only where a process that was killed left it half written.
   enum class Mode { read, write, create };
 
   Database(const std::string& path, Mode mode);
@@ -82,11 +85,14 @@ class Database {
 
   void execute(const std::string& sql);  // any number of statements, no results
   std::int64_t pragma(const std::string& name);
+  bool in_transaction() const;
 
   sqlite3* handle() const { return handle_; }
   [[noreturn]] void fail(const std::string& what) const;
 
  private:
+  void open(int flags);
+
   std::string path_;
   sqlite3* handle_ = nullptr;
 };

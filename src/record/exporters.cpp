@@ -99,6 +99,20 @@ Json events_json(const StoredRun& run) {
   return events;
 }
 
+Json parts_json(const StoredRun& run) {
+  Json parts = Json::array();
+  for (const StoredPart& part : run.parts) {
+    Json row = {{"started_utc", part.started_utc},
+                {"first_dwell", part.first_dwell},
+                {"first_tick", part.first_tick}};
+    if (!part.finished_utc.empty()) row["finished_utc"] = part.finished_utc;
+    if (!part.outcome.empty()) row["outcome"] = part.outcome;
+    if (!part.detail.empty()) row["detail"] = part.detail;
+    parts.push_back(std::move(row));
+  }
+  return parts;
+}
+
 Json timing_json(const StoredRun& run) {
   Json timings = Json::array();
   for (const StoredTiming& timing : run.timings) {
@@ -115,6 +129,8 @@ Json timing_json(const StoredRun& run) {
                        {"minor_faults", usage(&ThreadUsage::minor_faults)},
                        {"major_faults", usage(&ThreadUsage::major_faults)},
                        {"involuntary_switches", usage(&ThreadUsage::involuntary_switches)}});
+    const auto lag = run.lag_s.find(timing.dwell);
+    if (lag != run.lag_s.end()) timings.back()["durable_after_s"] = lag->second;
   }
   return timings;
 }
@@ -165,6 +181,7 @@ void write_json(std::ostream& stream, const StoredRun& run) {
                          {"plan", plan_json(run.plan)},
                          {"responses", responses},
                          {"events", events_json(run)},
+                         {"parts", parts_json(run)},
                          {"timing", timing_json(run)}};
   stream << document.dump(1) << '\n';
 }

@@ -15,11 +15,13 @@ constexpr std::chrono::seconds commit_interval{1};
 
 }  // namespace
 
-Recorder::Recorder(Outbox& outbox, SweepWriter& writer, Observer observer, Samples samples)
+Recorder::Recorder(Outbox& outbox, SweepWriter& writer, Observer observer, Samples samples,
+                   double tick_s)
     : outbox_{outbox},
       writer_{writer},
       observer_{std::move(observer)},
       samples_{samples},
+      tick_s_{tick_s},
       thread_{[this] {
         drain();
       }} {}
@@ -43,9 +45,7 @@ void Recorder::drain() {
     while (true) {
       const bool last_look = outbox_.closed();
       if (outbox_.try_take(record)) {
-        if (samples_ == Samples::written || !std::holds_alternative<TickSamples>(record))
-          writer_.write(record);
-        if (observer_) observer_(record);
+        take_down(record);
       } else if (last_look) {
         break;
       } else {
@@ -59,7 +59,61 @@ void Recorder::drain() {
     writer_.commit();
   } catch (...) {
     failure_ = std::current_exception();
-    outbox_.abandon();
+    save_the_rest();
+  }
+}
+
+void Recorder::take_down(const Record& record) {
+  if (samples_ == Samples::written || !std::holds_alternative<TickSamples>(record)) {
+    writer_.write(record);
+  }
+  if (const auto* timing = std::get_if<DwellTiming>(&record)) {
+    end_dwell(*timing);
+  } else if (std::holds_alternative<Point>(record)) {
+    points_.push_back(record);
+  } else if (observer_ && !std::holds_alternative<Lesson>(record)) {
+    observer_(record);
+  }
+}
+
+// Its points are on the disk now: the loop and whoever watches may know.
+void Recorder::end_dwell(const DwellTiming& timing) {
+  const auto lag = static_cast<double>(outbox_.acknowledge());
+  if (tick_s_ > 0.0) writer_.note_lag(timing.dwell, lag * tick_s_);
+  if (observer_) {
+    for (const Record& point : points_) observer_(point);
+    observer_(timing);
+  }
+  points_.clear();
+}
+
+// The disk is full or gone. The loop is told to stop; what it still has to say of that is small and
+// may find room.
+void Recorder::save_the_rest() noexcept {
+  outbox_.abandon();
+  bool writing = writer_.rescue();
+  Record record;
+  while (true) {
+    const bool last_look = outbox_.closed();
+    if (outbox_.try_take(record)) {
+      const bool bulky =
+          std::holds_alternative<Block>(record) || std::holds_alternative<TickSamples>(record);
+      if (bulky || !writing) continue;
+      try {
+        writer_.write(record);
+      } catch (...) {
+        writing = false;
+      }
+    } else if (last_look) {
+      break;
+    } else {
+      std::this_thread::sleep_for(idle_interval);
+    }
+  }
+  try {
+    if (writing) writer_.commit();
+  } catch (...) {
+    // Nothing more can be done; what was on the disk before still is.
   }
 }
 

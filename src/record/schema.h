@@ -1,5 +1,5 @@
-// The sweep file, version 1. SQLite keeps the comments, so `sqlite3 NAME.sweep .schema` documents
-// any file by itself.
+// The sweep file, version 1: tables and columns may be added to it, none changes its meaning.
+// SQLite keeps the comments, so `sqlite3 NAME.sweep .schema` documents any file by itself.
 #pragma once
 
 #include <cstdint>
@@ -73,7 +73,8 @@ CREATE TABLE point (            -- H = Y/U at one frequency, written when its dw
 CREATE TABLE block (            -- plain sums of a complete block: y ~ mean + a cos(ωt) + b sin(ωt),
                                 -- t = 0 at the start of the dwell
   dwell      INTEGER NOT NULL,
-  attempt    INTEGER NOT NULL,  -- more than one where the level was corrected; the last one counts
+  attempt    INTEGER NOT NULL,  -- more than one where the level was corrected or the run
+                                -- interrupted; the last one counts
   block      INTEGER NOT NULL,
   tone       INTEGER NOT NULL,
   channel    INTEGER NOT NULL,
@@ -83,6 +84,38 @@ CREATE TABLE block (            -- plain sums of a complete block: y ~ mean + a 
   mean       REAL,
   PRIMARY KEY (dwell, attempt, block, tone, channel)
 ) WITHOUT ROWID;
+
+CREATE TABLE part (             -- a run is one part, and one more for each time it was resumed
+  id           INTEGER PRIMARY KEY, -- from 0
+  started_utc  TEXT NOT NULL,
+  finished_utc TEXT,            -- NULL while it runs, and for ever where it was killed
+  outcome      TEXT,            -- done, interrupted, stopped; killed: said by the part that follows
+  detail       TEXT NOT NULL DEFAULT '', -- for people
+  first_dwell  INTEGER NOT NULL, -- where it began; a dwell belongs to the last part that began at or
+                                -- before it
+  first_tick   INTEGER NOT NULL -- ticks count on from part to part
+);
+
+CREATE TABLE lesson (           -- what a try at a dwell taught those that follow: a resumed run begins
+                                -- with it. Variances are of one component of H
+  dwell           INTEGER NOT NULL,
+  attempt         INTEGER NOT NULL,
+  tone            INTEGER NOT NULL,
+  response        INTEGER NOT NULL,
+  re              REAL,
+  im              REAL,
+  input_amplitude REAL,
+  white           REAL,         -- variance, were the residual white
+  scatter         REAL,         -- variance from the scatter of clusters
+  scatter_dof     REAL,
+  residual_rms    REAL,         -- of the output
+  PRIMARY KEY (dwell, attempt, tone, response)
+) WITHOUT ROWID;
+
+CREATE TABLE durability (       -- real time only: how far behind the loop the disk is
+  dwell INTEGER PRIMARY KEY,
+  lag_s REAL NOT NULL           -- from the end of the dwell until its points were on the disk
+);
 
 CREATE TABLE timing (           -- of the loop, per dwell
   dwell           INTEGER PRIMARY KEY,

@@ -146,6 +146,38 @@ std::vector<StoredTiming> read_timings(Database& database) {
   return timings;
 }
 
+// These tables came after the first files of this version.
+bool has_table(Database& database, const std::string& name) {
+  Statement found{database, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?"};
+  found.bind(name);
+  return found.step();
+}
+
+std::vector<StoredPart> read_parts(Database& database) {
+  if (!has_table(database, "part")) return {};
+  std::vector<StoredPart> parts;
+  Statement rows{database,
+                 "SELECT started_utc, finished_utc, outcome, detail, first_dwell, first_tick "
+                 "FROM part ORDER BY id"};
+  while (rows.step()) {
+    parts.push_back({.started_utc = rows.text(0),
+                     .finished_utc = rows.text(1),
+                     .outcome = rows.text(2),
+                     .detail = rows.text(3),
+                     .first_dwell = whole<std::uint32_t>(rows, 4),
+                     .first_tick = whole<std::uint64_t>(rows, 5)});
+  }
+  return parts;
+}
+
+std::map<std::uint32_t, double> read_lags(Database& database) {
+  if (!has_table(database, "durability")) return {};
+  std::map<std::uint32_t, double> lags;
+  Statement rows{database, "SELECT dwell, lag_s FROM durability"};
+  while (rows.step()) lags[whole<std::uint32_t>(rows, 0)] = rows.number(1);
+  return lags;
+}
+
 }  // namespace
 
 std::optional<ThreadUsage> StoredRun::usage() const {
@@ -178,6 +210,8 @@ StoredRun read_sweep(const std::string& path) {
   run.fits = read_fits(database);
   run.events = read_events(database);
   run.timings = read_timings(database);
+  run.parts = read_parts(database);
+  run.lag_s = read_lags(database);
   return run;
 }
 

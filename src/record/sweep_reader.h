@@ -58,6 +58,16 @@ struct StoredTiming {
   std::optional<ThreadUsage> usage{};  // nothing: virtual time, or a file from before it was kept
 };
 
+// A run is one part, and one more for each time that it was resumed.
+struct StoredPart {
+  std::string started_utc;
+  std::string finished_utc;  // empty while it runs, and where it was killed
+  std::string outcome;       // done, interrupted, stopped, killed; empty while it runs
+  std::string detail;        // for people
+  std::uint32_t first_dwell = 0;
+  std::uint64_t first_tick = 0;
+};
+
 // The points of one pair of channels, by rising frequency.
 struct StoredResponse {
   std::uint32_t input = 0;
@@ -72,6 +82,8 @@ struct StoredRun {
   std::vector<StoredResponse> responses;
   std::vector<StoredEvent> events;
   std::vector<StoredTiming> timings;
+  std::vector<StoredPart> parts;          // none in files of before there were any
+  std::map<std::uint32_t, double> lag_s;  // by dwell: until its points were on the disk
   std::vector<StoredFit> fits;
 
   // Of all dwells; nothing where none has it.

@@ -1,11 +1,14 @@
 // Writes NAME.sweep, one SQLite database that holds everything about one run.
 #pragma once
 
-#include <map>
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "record/database.h"
+#include "record/file_lock.h"
+#include "record/spare_room.h"
 #include "sweep/plan.h"
 #include "sweep/records.h"
 
@@ -25,36 +28,63 @@ struct RunInfo {
   SweepPlan plan;
 };
 
+// Where a part of a run begins.
+struct PartStart {
+  std::uint32_t dwell = 0;
+  std::uint64_t tick = 0;     // of the file, for the part's own tick 0
+  std::uint32_t attempt = 0;  // of that dwell, for the part's own first
+};
+
 class SweepWriter {
  public:
   enum class IfExists { refuse, replace };
 
   // Creates the file with the plan in it. Throws SweepFileError; an existing file is left alone
-  // unless it is to be replaced.
+  // unless it is to be replaced, and one that is being written in any case.
   SweepWriter(const std::string& path, const RunInfo& info, IfExists if_exists);
+
+  // Opens the file of an interrupted run; it stays as it is until begin_part(). Throws FileInUse
+  // while its run goes on, SweepFileError.
+  SweepWriter(const std::string& path, const RunInfo& info);
   ~SweepWriter();
 
   const std::string& path() const { return path_; }
 
-  // Each record becomes a row; a finished point is on the disk when this returns.
+  // From here on records are those of a new part. A part before it that was never ended was killed.
+  void begin_part(const PartStart& start);
+
+  // Each record becomes a row; a finished dwell is on the disk when this returns.
   void write(const Record& record);
 
-  // Puts what is pending on the disk.
+  // Puts what is pending on the disk, but never a part of a dwell's points.
   void commit();
 
-  // The last word: when it ended, and the file made one plain file without a log beside it.
+  // How far behind the loop a dwell's points reached the disk; kept with the next commit.
+  void note_lag(std::uint32_t dwell, double lag_s);
+
+  // The disk is full or gone: gives back the room that was spared, and tries once more to put down
+  // all but blocks and samples since the last commit. False where that failed, too.
+  bool rescue() noexcept;
+
+  // The last word: how and when it ended, and the file made one plain file without a log beside it,
+  // unless somebody is reading it or the disk has no room for that.
+  void end_part(const std::string& outcome, const std::string& detail);
   void finish();
 
-  // Removes the file: the run never began.
+  // The run never began: removes the file that it was created for, leaves one that it was opened
+  // for.
   void discard();
 
-  // A fact about the whole run, such as how it ended.
+  // A fact about the whole run.
   void set(const std::string& key, const std::string& value);
 
  private:
   struct Statements;
 
+  void open(const RunInfo& info);
   void begin();
+  void put_on_disk();
+  void write_head(const RunInfo& info);
   void write_dwell(std::size_t index, const Dwell& dwell);
   void insert(const Point& point);
   void insert(const Block& block);
@@ -63,14 +93,21 @@ class SweepWriter {
   void insert(const Preflight& preflight);
   void insert(const Note& note);
   void insert(const TickSamples& samples);
+  void insert(const Lesson& lesson);
+  std::uint32_t attempt_of(std::uint32_t dwell, std::uint32_t attempt) const;
 
   std::string path_;
   std::vector<std::string> channel_names_;
   std::vector<std::string> sensor_names_;
-  std::vector<Dwell> candidates_;  // of the plan's refinement
-  Database database_;
+  std::vector<Dwell> candidates_;   // of the plan's refinement
+  bool created_;                    // not resumed
+  std::unique_ptr<FileLock> lock_;  // outlives the database
+  std::unique_ptr<SpareRoom> spare_;
+  std::unique_ptr<Database> database_;
   std::unique_ptr<Statements> statements_;
-  bool in_transaction_ = false;
+  PartStart start_;
+  std::vector<Record> pending_;  // since the last commit, but blocks and samples
+  bool dwell_half_written_ = false;
 };
 
 }  // namespace sinerig::record

@@ -64,6 +64,15 @@ Progress::Progress(std::ostream& stream, Style style, const SweepPlan& plan, std
       columns_{std::min<std::size_t>(columns, 110)},
       time_{plan} {}
 
+void Progress::resume(const std::vector<Point>& points) {
+  for (const Point& point : points) {
+    if (point.pair != 0) continue;
+    ++seen_;
+    if (point.status != PointStatus::good) ++not_good_;
+    if (style_ == Style::live) points_.push_back(point);
+  }
+}
+
 void Progress::point(const Point& point) {
   if (point.pair != 0) return;
   ++seen_;

@@ -24,6 +24,9 @@ class Progress {
   // `columns` is the width of the terminal; below 80 a live picture becomes lines.
   Progress(std::ostream& stream, Style style, const SweepPlan& plan, std::size_t columns);
 
+  // Points of before an interruption: counted and drawn, not listed again.
+  void resume(const std::vector<Point>& points);
+
   // A finished point; those of the first response are shown.
   void point(const Point& point);
 

@@ -9,6 +9,7 @@
 
 #include "record/confidence.h"
 #include "report/report_data.h"
+#include "report/run_parts.h"
 #include "report/terminal.h"
 
 namespace sinerig::report {
@@ -180,6 +181,8 @@ Json summary_facts(const StoredRun& run) {
   const double seconds = bench_seconds(run);
   if (seconds > 0.0) add({"Bench time", duration_text(seconds), ""});
   if (!run.timings.empty()) add(loop_fact(run));
+  if (run.parts.size() > 1)
+    add({"Parts", std::to_string(run.parts.size()), "interrupted and resumed, see the facts"});
   return facts;
 }
 
@@ -192,6 +195,10 @@ Json run_json(const LabelledRun& labelled) {
     std::replace(name.begin(), name.end(), '_', ' ');
     facts.push_back({name, value});
   }
+  const std::vector<std::string> parts = part_texts(run);
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    facts.push_back({"part " + std::to_string(i + 1), parts[i]});
+  if (const std::string disk = disk_text(run); !disk.empty()) facts.push_back({"disk", disk});
   return {{"label", labelled.label},          {"facts", facts},
           {"rig_name", run.fact("rig_name")}, {"rig_text", run.fact("rig_text")},
           {"rate_hz", run.plan.rate_hz},      {"events", events_json(run)},

@@ -7,6 +7,8 @@
 #include <ostream>
 #include <utility>
 
+#include "report/run_parts.h"
+
 namespace sinerig::report {
 
 namespace {
@@ -203,6 +205,11 @@ void print_head(std::ostream& stream, const record::StoredRun& run) {
   if (const auto usage = run.usage()) stream << ", " << usage_text(*usage);
   stream << '\n';
   print_rights(stream, run);
+  const std::string disk = disk_text(run);
+  if (!disk.empty()) stream << "disk     " << disk << '\n';
+  const std::vector<std::string> parts = part_texts(run);
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    stream << text("part %-3zu ", i + 1) << parts[i] << '\n';
 }
 
 }  // namespace

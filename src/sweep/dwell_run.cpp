@@ -133,6 +133,18 @@ void DwellRun::check_excitation(std::uint64_t tick, std::int64_t applied_offset_
   }
 }
 
+void DwellRun::put_lessons() noexcept {
+  for (std::size_t pair = 0; pair < measurement_.pairs().size(); ++pair) {
+    for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
+      std::optional<Lesson> lesson = measurement_.lesson(pair, tone);
+      if (!lesson) continue;
+      lesson->dwell = index_;
+      lesson->attempt = attempt_;
+      sink_.put(*lesson);
+    }
+  }
+}
+
 Point DwellRun::point(std::size_t pair, std::size_t tone) const noexcept {
   Point point = measurement_.point(pair, tone);
   point.dwell = index_;

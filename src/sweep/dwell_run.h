@@ -42,6 +42,12 @@ class DwellRun {
 
   // Takes the judgement as it stands, for the end or a stop in the midst of it.
   void conclude() noexcept SINERIG_NONBLOCKING { measurement_.conclude(); }
+  // Hands over what the concluded window has taught; takes in what an earlier run's has.
+  void put_lessons() noexcept SINERIG_NONBLOCKING;
+  void recall(const Lesson& lesson, const Dwell& dwell) noexcept {
+    measurement_.recall(lesson, dwell);
+  }
+
   Point point(std::size_t pair, std::size_t tone) const noexcept SINERIG_NONBLOCKING;
   const DwellTiming& timing() const noexcept { return timing_; }
 

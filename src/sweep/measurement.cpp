@@ -66,6 +66,13 @@ constexpr double default_settling_tolerance = 1e-3;
 // At 6 the end of a transient was taken for a burst in 2 of 1000 clean points.
 constexpr double burst_ratio = 25.0;
 
+// rad/s; one formula, so that what is recalled is what was learnt to the last bit.
+double angular_frequency(const Dwell& dwell, const Tone& tone, double rate_hz) {
+  const double per_cycle =
+      2.0 * std::numbers::pi * rate_hz / static_cast<double>(dwell.block_samples);
+  return per_cycle * static_cast<double>(tone.cycles);
+}
+
 }  // namespace
 
 Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t max_tones,
@@ -85,16 +92,15 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
 
 void Measurement::start(const Dwell& dwell) noexcept {
   dwell_ = &dwell;
-  const double per_cycle =
-      2.0 * std::numbers::pi * rate_hz_ / static_cast<double>(dwell.block_samples);
   std::size_t bin = 0;
-  for (const Tone& tone : dwell.tones) omega_[bin++] = per_cycle * static_cast<double>(tone.cycles);
+  for (const Tone& tone : dwell.tones) omega_[bin++] = angular_frequency(dwell, tone, rate_hz_);
   for (std::uint32_t order = 2; order <= dwell.harmonics; ++order)
     omega_[bin++] = order * omega_[0];
   if (dwell.bias_hz > 0.0) omega_[bin++] = 2.0 * std::numbers::pi * dwell.bias_hz;
   regression_.start({omega_.data(), dwell.bins()}, 1.0 / rate_hz_,
                     static_cast<double>(dwell.block_samples),
                     dwell.bias_hz > 0.0 ? 0 : dwell.parts);
+  taught_ = false;
   restart();
 }
 
@@ -319,6 +325,7 @@ void Measurement::conclude() noexcept {
   if (dwell_ == nullptr || done_) return;
   const Window window = current_window();
   if (window.last == window.first) return;
+  taught_ = true;
   for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
     if (!evaluate(pair, window)) continue;
     if (dwell_->tones.size() == 1) {
@@ -330,6 +337,33 @@ void Measurement::conclude() noexcept {
       memories_[pair].learn(each.estimate, omega_[tone] / (2.0 * std::numbers::pi));
     }
   }
+}
+
+std::optional<Lesson> Measurement::lesson(std::size_t pair, std::size_t tone) const noexcept {
+  const Result& each = result(pair, tone);
+  if (!taught_ || !each.known) return std::nullopt;
+  const Estimate& estimate = each.estimate;
+  return Lesson{.tone = static_cast<std::uint16_t>(tone),
+                .pair = static_cast<std::uint16_t>(pair),
+                .response = estimate.response,
+                .input_amplitude = std::abs(estimate.input),
+                .white = estimate.white.mean_variance(),
+                .scatter = estimate.scatter,
+                .scatter_dof = estimate.scatter_dof,
+                .residual_rms = estimate.residual_rms};
+}
+
+void Measurement::recall(const Lesson& lesson, const Dwell& dwell) noexcept {
+  const double omega_rad_s = angular_frequency(dwell, dwell.tones[lesson.tone], rate_hz_);
+  if (dwell.tones.size() == 1) {
+    transients_[lesson.pair].learn(lesson.response, omega_rad_s, lesson.input_amplitude);
+  }
+  Estimate estimate{};
+  estimate.white = {.re_re = lesson.white, .re_im = 0.0, .im_im = lesson.white};
+  estimate.scatter = lesson.scatter;
+  estimate.scatter_dof = lesson.scatter_dof;
+  estimate.residual_rms = lesson.residual_rms;
+  memories_[lesson.pair].learn(estimate, omega_rad_s / (2.0 * std::numbers::pi));
 }
 
 Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {

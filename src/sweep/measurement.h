@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -61,6 +62,14 @@ class Measurement {
   Point point(std::size_t pair, std::size_t tone) const noexcept SINERIG_NONBLOCKING;
   const Pairs& pairs() const noexcept { return pairs_; }
 
+  // What the concluded window has taught; nothing where there was too little to estimate.
+  std::optional<Lesson> lesson(std::size_t pair,
+                               std::size_t tone) const noexcept SINERIG_NONBLOCKING;
+
+  // Learns again what an earlier run of the same plan has: `dwell` is the one of the lesson, and
+  // lessons come in the order in which they were taught.
+  void recall(const Lesson& lesson, const Dwell& dwell) noexcept;
+
  private:
   struct Result {
     Estimate estimate{};
@@ -114,6 +123,7 @@ class Measurement {
   bool block_complete_ = true;
   bool block_ended_ = false;
   bool done_ = false;
+  bool taught_ = false;  // the memories have taken in this dwell
 };
 
 }  // namespace sinerig

@@ -105,6 +105,22 @@ struct DwellTiming {
   std::optional<ThreadUsage> usage{};  // of the loop's thread, all tries of the dwell; see Clock
 };
 
+// What a try at a dwell has taught the ones that follow, per tone and response: kept beside the
+// points, so that a sweep that goes on after an interruption expects what the first part had
+// learnt.
+struct Lesson {
+  std::uint32_t dwell = 0;
+  std::uint32_t attempt = 0;
+  std::uint16_t tone = 0;
+  std::uint16_t pair = 0;
+  std::complex<double> response{};
+  double input_amplitude = 0.0;
+  double white = 0.0;    // variance of a component of H, were the residual white
+  double scatter = 0.0;  // … from the clusters of the window
+  double scatter_dof = 0.0;
+  double residual_rms = 0.0;  // of the output
+};
+
 enum class EventKind : std::uint8_t {
   started,
   dwell_began,
@@ -154,7 +170,7 @@ struct TickSamples {
   std::array<double, max_channels> values{};
 };
 
-using Record = std::variant<Point, Block, DwellTiming, Event, Preflight, Note, TickSamples>;
+using Record = std::variant<Point, Block, DwellTiming, Event, Preflight, Note, TickSamples, Lesson>;
 static_assert(std::is_trivially_copyable_v<Record>);
 
 // Where the loop hands its records. Called from the loop's thread; may not wait or allocate.

@@ -124,11 +124,11 @@ bool SweepRunner::step(RunControl& control) noexcept {
   run_.measure(tick.index, observations_, ticks > 1 || late || command_lost_ || command_late_);
   if (run_.over()) conclude_dwell();
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
-  return go_on();
+  return keep_going();
 }
 
 // False at the end of the plan, where nothing is left to be taken back to neutral.
-bool SweepRunner::go_on() noexcept {
+bool SweepRunner::keep_going() noexcept {
   if (dwell_ < dwells_.size()) return true;
   excitation_.close();
   return !excitation_.closed();

@@ -29,6 +29,14 @@ struct RunOutcome {
   std::uint32_t soft_trips = 0;  // after which a dwell was tried again at a lower amplitude
 };
 
+// What an earlier, interrupted run of the same plan has left.
+struct FinishedDwells {
+  std::uint32_t dwells = 0;        // finished, from the first on: the run goes on with the next
+  std::vector<Point> points;       // theirs, of all tones and responses
+  std::vector<Lesson> lessons;     // in the order in which they were taught
+  std::uint32_t known_dwells = 0;  // dwells that are on record, those added by refinement included
+};
+
 class SweepRunner {
  public:
   // All memory of the loop is taken here. What is referred to must outlive the runner; `plan` is
@@ -36,6 +44,14 @@ class SweepRunner {
   SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, Actuator& actuator,
               std::span<Sensor* const> sensors, Guard& guard, RecordSink& sink,
               Rearm* rearm = nullptr);
+
+  // Before run(): goes on behind the finished dwells instead of beginning with the first, knowing
+  // what they have taught: level, refinement, colour of the noise, size of the transient. False
+  // when there is nothing left to measure.
+  bool go_on(const FinishedDwells& finished);
+
+  // Of the plan, and those that refinement has added so far.
+  const std::vector<const Dwell*>& dwells() const noexcept { return dwells_; }
 
   // Runs to the end of the plan, a trip of the guard or a stop request. The actuator is released on
   // every way out.
@@ -47,7 +63,7 @@ class SweepRunner {
   bool applied_late(std::int64_t offset_ns) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
   bool under_way() const noexcept { return dwell_ < dwells_.size() && run_.begun(); }
-  bool go_on() noexcept;
+  bool keep_going() noexcept;
   bool pause(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
   bool recover(RunControl& control) noexcept;
   void conclude_dwell() noexcept;
@@ -58,7 +74,7 @@ class SweepRunner {
   void finish_dwell() noexcept;
   void next_dwell() noexcept;
   void account_usage() noexcept SINERIG_NONBLOCKING;
-  void refine() noexcept;
+  void refine(bool tell = true) noexcept;
   void note_sensor(std::size_t sensor, const Sample& sample, std::uint64_t tick) noexcept;
   void announce(const Event& event) noexcept { sink_.put(event); }
 
@@ -95,8 +111,7 @@ class SweepRunner {
   bool command_late_ = false;
   bool applied_known_ = false;
   std::int64_t applied_offset_ns_ = 0;  // of the last command from its tick
-  DwellTiming timing_;
-  std::optional<ThreadUsage> usage_;  // of the loop's thread, at the end of the dwell before
+  std::optional<ThreadUsage> usage_;    // of the loop's thread, at the end of the dwell before
   std::uint64_t last_tick_ = 0;
   RunOutcome outcome_;
 };

@@ -60,12 +60,13 @@ bool SweepRunner::pause(std::uint64_t ticks) noexcept {
     return false;
   } else {
     run_.conclude();
+    run_.put_lessons();
     finish_dwell();
     next_dwell();
   }
   guard_.resume();
   excitation_.rest();
-  return go_on();
+  return keep_going();
 }
 
 void SweepRunner::tell_trip(EventKind kind) noexcept {
@@ -81,6 +82,35 @@ void SweepRunner::tell_trip(EventKind kind) noexcept {
             .trip = trip});
 }
 
+bool SweepRunner::go_on(const FinishedDwells& finished) {
+  auto point = finished.points.begin();
+  auto lesson = finished.lessons.begin();
+  while (dwell_ < finished.dwells && dwell_ < dwells_.size()) {
+    const Dwell& dwell = *dwells_[dwell_];
+    for (; lesson != finished.lessons.end() && lesson->dwell <= dwell_; ++lesson) {
+      run_.recall(*lesson, dwell);
+    }
+    for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
+      const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
+      for (; point != finished.points.end() && point->dwell == dwell_ && point->tone == tone;
+           ++point) {
+        if (point->pair == 0 && tone == 0) leveller_.accept(*point);
+        if (refining && point->status == PointStatus::good) {
+          refiner_.set(point->pair, point->response, point->covariance.mean_variance());
+        }
+      }
+      if (refining) refiner_.learn();
+    }
+    ++dwell_;
+    ++outcome_.dwells_done;
+    if (dwell_ == dwells_.size()) refine(dwell_ >= finished.known_dwells);
+  }
+  for (; lesson != finished.lessons.end() && dwell_ < dwells_.size(); ++lesson) {
+    run_.recall(*lesson, *dwells_[dwell_]);
+  }
+  return dwell_ < dwells_.size();
+}
+
 void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
   const Dwell& dwell = *dwells_[dwell_];
   if (!scale_chosen_) {
@@ -94,6 +124,7 @@ void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
 
 void SweepRunner::conclude_dwell() noexcept {
   run_.conclude();
+  run_.put_lessons();
   if (preflight_) {
     if (!pass_preflight()) return;
     preflight_ = false;
@@ -138,12 +169,13 @@ void SweepRunner::next_dwell() noexcept {
 }
 
 // One more dwell where the response between two points is not known.
-void SweepRunner::refine() noexcept {
+void SweepRunner::refine(bool tell) noexcept {
   if (dwells_.size() == plan_.dwells.size() + plan_.refinement.most_points) return;
   const double disagreement_db = refiner_.worst_db();
   const std::optional<std::size_t> candidate = refiner_.next();
   if (!candidate) return;
   dwells_.push_back(&plan_.refinement.candidates[*candidate]);  // within what was reserved
+  if (!tell) return;
   announce({.kind = EventKind::refined,
             .dwell = dwell_,
             .tick = last_tick_,

@@ -69,6 +69,8 @@ std::string refusal_of(const std::string& path) {
 
 void write_and_finish(const std::string& path) {
   SweepWriter writer{path, an_info(), SweepWriter::IfExists::refuse};
+  writer.begin_part({});
+  writer.end_part("done", "");
   writer.finish();
 }
 
@@ -98,7 +100,7 @@ TEST_F(SweepFile, IsReadBackAsItWasWritten) {
     writer.write(DwellTiming{.dwell = 1, .first_tick = 107, .ticks = 50});
     const Trip trip{.cause = TripCause::channel_limit, .channel = 0, .value = 3.0, .limit = 2.0};
     writer.write(Event{.kind = EventKind::tripped, .tick = 12, .trip = trip});
-    writer.set("outcome", "stopped");
+    writer.end_part("stopped", "gyro");
     writer.finish();
   }
   const StoredRun run = read_sweep(path());
@@ -284,11 +286,12 @@ TEST_F(SweepFile, IsWrittenByAThreadBesideTheLoop) {
       outbox.put_sample({.tick = tick, .channels = 3, .values = {1.0, 2.0, 3.0}});
     }
     outbox.put(a_point(0));
+    outbox.put(DwellTiming{.dwell = 0});
     outbox.close();
     recorder.finish();
   }
   writer.finish();
-  EXPECT_EQ(seen, 2001U);
+  EXPECT_EQ(seen, 2002U);
   EXPECT_EQ(read_sweep(path()).responses.at(0).points.size(), 1U);
   Database database{path(), Database::Mode::read};
   Statement count{database, "SELECT count(*) FROM sample"};

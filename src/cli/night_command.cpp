@@ -1,0 +1,201 @@
+#include "cli/night_command.h"
+
+#include <algorithm>
+#include <ctime>
+#include <iostream>
+#include <map>
+#include <sstream>
+
+#include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
+
+#include "cli/night_folder.h"
+#include "cli/output_file.h"
+#include "cli/recorded_run.h"
+#include "cli/stop_on_signal.h"
+#include "report/night_summary.h"
+
+namespace sinerig::cli {
+
+namespace {
+
+using nlohmann::ordered_json;
+
+std::unique_ptr<ConfiguredRig> configured_rig(const NightTask& task,
+                                              const std::vector<DriverKit>& drivers) {
+  return std::make_unique<ConfiguredRig>(config::RigFile::parse(task.rig_text, task.sweep->rig),
+                                         drivers);
+}
+
+void print_line(const ordered_json& json) {
+  std::cout << json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) << std::endl;
+}
+
+class Night {
+ public:
+  Night(const NightOptions& options, const std::vector<DriverKit>& drivers, WallTime& time)
+      : options_{options},
+        drivers_{drivers},
+        time_{time},
+        job_{read_night_job(options.job)},
+        tasks_{tasks_of(job_)} {
+    // Whatever can be refused is, before the first of them moves anything.
+    for (const NightTask& task : tasks_) {
+      configured_rig(task, drivers_)->rig().plan();
+      state_of(task);
+    }
+  }
+
+  int run();
+
+ private:
+  bool wait_for(const NightTask& task, const NightFolder& folder);
+  int sweep(const NightTask& task, TaskState state);
+  int conclude(const NightFolder& folder, int code);
+  void tell(const NightTask& task, TaskState state, std::size_t number) const;
+
+  const NightOptions& options_;
+  const std::vector<DriverKit>& drivers_;
+  WallTime& time_;
+  NightJob job_;
+  std::vector<NightTask> tasks_;
+  RunControl between_;                           // a stop between sweeps
+  std::map<std::string, std::string> failures_;  // by sweep file: could not be run at all
+};
+
+// False when told to stop meanwhile.
+bool Night::wait_for(const NightTask& task, const NightFolder& folder) {
+  const NightSweep& sweep = *task.sweep;
+  std::int64_t until_s = time_.now_s() + static_cast<std::int64_t>(sweep.pause_s);
+  if (task.repeat == 1 && sweep.second_of_day) {
+    until_s = std::max(until_s, next_time_of_day(folder.began_s(), *sweep.second_of_day));
+  }
+  if (task.repeat == 1 && sweep.start_after_s) {
+    until_s = std::max(until_s, folder.began_s() + static_cast<std::int64_t>(*sweep.start_after_s));
+  }
+  if (until_s > time_.now_s() && options_.voice == Voice::text) {
+    spdlog::info("waiting until {} for {}-{}", local_time_text(until_s), sweep.name, task.repeat);
+  }
+  return time_.wait_until(until_s, between_.stop_requests);
+}
+
+void Night::tell(const NightTask& task, TaskState state, std::size_t number) const {
+  const bool resumed = state != TaskState::not_begun;
+  if (options_.voice == Voice::json) {
+    print_line({{"type", "sweep"},
+                {"name", task.sweep->name},
+                {"repeat", task.repeat},
+                {"number", number},
+                {"of", tasks_.size()},
+                {"resumed", resumed},
+                {"sweep", task.sweep_file}});
+  } else if (options_.voice == Voice::text) {
+    spdlog::info("{}-{}, {} of {}{}", task.sweep->name, task.repeat, number, tasks_.size(),
+                 resumed ? ", goes on" : "");
+  }
+}
+
+int Night::sweep(const NightTask& task, TaskState state) {
+  if (state != TaskState::not_begun) {
+    return resume_command({.file = task.sweep_file, .table = false, .voice = options_.voice},
+                          drivers_);
+  }
+  const std::unique_ptr<ConfiguredRig> configured = configured_rig(task, drivers_);
+  const SweepPlan plan = configured->rig().plan();
+  // What is there has no plan in it: a run that was killed as it began.
+  return record_run(*configured, plan,
+                    {.sweep_file = task.sweep_file, .voice = options_.voice, .table = false}, [&] {
+                      return std::make_unique<record::SweepWriter>(
+                          task.sweep_file, run_info(configured->rig(), plan),
+                          record::SweepWriter::IfExists::replace);
+                    });
+}
+
+int Night::run() {
+  const StopOnSignal stop_on_signal{between_};
+  const NightFolder folder{job_, time_};
+  int code = exit_done;
+  std::size_t number = 0;
+  for (const NightTask& task : tasks_) {
+    ++number;
+    const TaskState state = state_of(task);
+    const bool leave = state == TaskState::stopped && !job_.stop_on_stop;
+    if (leave) code = exit_stopped;
+    if (state == TaskState::done || leave) continue;
+    if (state == TaskState::not_begun && !wait_for(task, folder)) {
+      return conclude(folder, exit_interrupted);
+    }
+    tell(task, state, number);
+    int ended = exit_stopped;
+    try {
+      ended = sweep(task, state);
+    } catch (const std::exception& error) {
+      spdlog::error("{}", error.what());
+      failures_[task.sweep_file] = error.what();
+    }
+    if (ended == exit_interrupted || between_.stop_requests.load() > 0) {
+      return conclude(folder, exit_interrupted);
+    }
+    if (ended != exit_done) code = exit_stopped;
+    if (ended != exit_done && job_.stop_on_stop) break;
+    if (!failures_.contains(task.sweep_file)) {
+      const record::StoredRun run = record::read_sweep(task.sweep_file);
+      std::uint64_t ticks = 0;
+      for (const record::StoredTiming& timing : run.timings) ticks += timing.ticks + timing.skipped;
+      time_.pass(static_cast<double>(ticks) / run.plan.rate_hz);
+    }
+  }
+  return conclude(folder, code);
+}
+
+int Night::conclude(const NightFolder& folder, int code) {
+  std::vector<report::NightRow> rows = night_rows(job_, tasks_);
+  bool changed = false;
+  for (report::NightRow& row : rows) {
+    changed = changed || row.changed();
+    const auto failure = failures_.find(row.file);
+    if (failure == failures_.end()) continue;
+    row.outcome = "failed";
+    row.detail = failure->second;
+  }
+  const ordered_json json = report::night_json(options_.job, rows);
+  std::ostringstream words;
+  report::print_night(words, options_.job, rows);
+  write_file(folder.path("summary.txt"), true,
+             [&](std::ostream& stream) { stream << words.str(); });
+  write_file(folder.path("summary.json"), true,
+             [&](std::ostream& stream) { stream << json.dump(1) << '\n'; });
+  if (options_.voice == Voice::json) {
+    ordered_json line{{"type", "night"}};
+    line.update(json);
+    print_line(line);
+  } else if (options_.voice == Voice::text) {
+    std::cout << words.str() << std::flush;
+    spdlog::info("wrote {} and summary.json", folder.path("summary.txt"));
+  }
+  return code == exit_done && changed ? exit_changed : code;
+}
+
+bool all_virtual(const NightJob& job, const std::vector<DriverKit>& drivers) {
+  const std::vector<NightTask> tasks = tasks_of(job);
+  return std::all_of(tasks.begin(), tasks.end(), [&](const NightTask& task) {
+    return configured_rig(task, drivers)->rig().clock == config::ClockKind::virtual_time;
+  });
+}
+
+}  // namespace
+
+int run_night(const NightOptions& options, const std::vector<DriverKit>& drivers, WallTime& time) {
+  return Night{options, drivers, time}.run();
+}
+
+int night_command(const NightOptions& options, const std::vector<DriverKit>& drivers) {
+  if (all_virtual(read_night_job(options.job), drivers)) {
+    PassingTime time{std::time(nullptr)};
+    return run_night(options, drivers, time);
+  }
+  SystemTime time;
+  return run_night(options, drivers, time);
+}
+
+}  // namespace sinerig::cli

@@ -1,0 +1,41 @@
+// The folder of a night: when it began, who works in it, and what its sweep files say.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "cli/night_job.h"
+#include "cli/wall_time.h"
+#include "record/file_lock.h"
+#include "report/night_summary.h"
+
+namespace sinerig::cli {
+
+class NightFolder {
+ public:
+  // Makes the folder and, durably, night.json in it with the time at which the night began; a night
+  // that is there already began when that says. Throws record::FileInUse where another process is
+  // at it, record::SweepFileError.
+  NightFolder(const NightJob& job, WallTime& time);
+
+  std::int64_t began_s() const { return began_s_; }
+  std::string path(const std::string& name) const;
+
+ private:
+  std::string folder_;
+  std::int64_t began_s_ = 0;
+  std::unique_ptr<record::FileLock> lock_;
+};
+
+enum class TaskState { not_begun, unfinished, stopped, done };
+
+// Where a task stands by its sweep file. Throws config::ConfigError where that was made from
+// another rig file.
+TaskState state_of(const NightTask& task);
+
+// One row per task, compared where there are points.
+std::vector<report::NightRow> night_rows(const NightJob& job, const std::vector<NightTask>& tasks);
+
+}  // namespace sinerig::cli

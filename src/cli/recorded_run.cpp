@@ -1,0 +1,284 @@
+#include "cli/recorded_run.h"
+
+#include <atomic>
+#include <cmath>
+#include <mutex>
+#include <thread>
+
+#include <spdlog/spdlog.h>
+
+#include "cli/live_view.h"
+#include "cli/real_time.h"
+#include "cli/report_file.h"
+#include "cli/run_teller.h"
+#include "cli/service_notifier.h"
+#include "cli/stop_on_signal.h"
+#include "record/recorder.h"
+#include "report/remaining_time.h"
+#include "sweep/outbox.h"
+#include "sweep/runner.h"
+
+namespace sinerig::cli {
+
+namespace {
+
+// Slots between the loop and the recorder: 4 s of samples at 10 kHz.
+constexpr std::size_t outbox_slots = 1U << 16U;
+constexpr std::size_t outbox_backlog = 1U << 14U;
+
+constexpr std::chrono::milliseconds progress_interval{50};
+
+// Points on their way from the recorder's thread to the one that prints.
+class PointInbox {
+ public:
+  void put(const Record& record) {
+    if (const auto* point = std::get_if<Point>(&record)) {
+      const std::scoped_lock lock{mutex_};
+      points_.push_back(*point);
+    }
+  }
+  std::vector<Point> take() {
+    const std::scoped_lock lock{mutex_};
+    return std::exchange(points_, {});
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<Point> points_;
+};
+
+// Who hears of a run: the terminal, a script, the live page. Each may be absent.
+struct Audience {
+  RunTeller& teller;
+  ServiceNotifier& service;
+  LiveView* view;
+  record::Recorder::Samples samples;
+  double tick_s;  // of a loop in real time; 0 in virtual time
+};
+
+struct Played {
+  RunOutcome outcome;
+  std::string disk_failure;  // empty: everything is on the disk
+};
+
+// Whatever happens to those who watch: the loop ends, neutral, before what it works on is gone.
+class EndOfLoop {
+ public:
+  EndOfLoop(realtime::LoopThread& loop, RunControl& control) : loop_{loop}, control_{control} {}
+  ~EndOfLoop() {
+    control_.stop_requests.store(2);
+    loop_.join();
+  }
+  EndOfLoop(const EndOfLoop&) = delete;
+  EndOfLoop& operator=(const EndOfLoop&) = delete;
+
+ private:
+  realtime::LoopThread& loop_;
+  RunControl& control_;
+};
+
+// The loop on its own thread, its story told on this one, until both the loop and the recorder are
+// done.
+Played play(const SweepPlan& plan, realtime::LoopThread& loop, SweepRunner& runner,
+            RunControl& control, Outbox& outbox, record::SweepWriter& writer,
+            const Audience& audience) {
+  PointInbox inbox;
+  report::RemainingTime time{plan};
+  audience.service.ready();
+  const auto observe = [&](const Record& record) {
+    inbox.put(record);
+    if (audience.view != nullptr) audience.view->run().take(record);
+  };
+  record::Recorder recorder{outbox, writer, observe, audience.samples, audience.tick_s};
+  Played played;
+  std::atomic<bool> done{false};
+  loop.start([&] { played.outcome = runner.run(control); },
+             [&] {
+               outbox.close();
+               done.store(true);
+             });
+  const EndOfLoop end_of_loop{loop, control};
+  const auto tell = [&] {
+    for (const Point& point : inbox.take()) audience.teller.point(point);
+    const std::uint32_t dwell = control.dwell.load();
+    const std::uint64_t tick = control.tick.load();
+    audience.teller.update(dwell, tick);
+    audience.service.progress(tick, std::chrono::steady_clock::now());
+    time.update(dwell, tick);
+    audience.service.status(status_text(plan, dwell, time));
+  };
+  while (!done.load()) {
+    tell();
+    std::this_thread::sleep_for(progress_interval);
+  }
+  loop.join();
+  try {
+    recorder.finish();
+  } catch (const record::SweepFileError& error) {
+    played.disk_failure = error.what();
+  }
+  tell();
+  audience.teller.close();
+  return played;
+}
+
+const char* outcome_name(const RunOutcome& outcome) {
+  if (!outcome.trip.tripped()) return "done";
+  return outcome.trip.cause == TripCause::stop_requested ? "interrupted" : "stopped";
+}
+
+int exit_code(const std::string& outcome) {
+  if (outcome == "done") return exit_done;
+  return outcome == "interrupted" ? exit_interrupted : exit_stopped;
+}
+
+// The run is safe in its file: a report that cannot be written is a warning. The path, empty then.
+std::string report_beside(const std::string& sweep_file) {
+  const std::string path = report_path(sweep_file);
+  try {
+    write_report(sweep_file, path, false);
+    return path;
+  } catch (const std::exception& error) {
+    spdlog::warn("no report: {}", error.what());
+    return {};
+  }
+}
+
+// Why the run was stopped, in words; empty where it was not.
+std::string reason_of(const Played& played, const Outbox& outbox, const ConfiguredRig& configured) {
+  const Trip& trip = played.outcome.trip;
+  if (!trip.tripped()) return played.disk_failure;
+  std::string reason = describe(trip, configured.rig().sensor_names());
+  const bool by_device =
+      trip.cause == TripCause::actuator_fault || trip.cause == TripCause::channel_age;
+  if (by_device && !configured.fault_reason().empty()) reason += ": " + configured.fault_reason();
+  if (played.outcome.faults > 0) {
+    reason +=
+        " (" + std::to_string(played.outcome.faults) + " tries to arm again are spent, [retry])";
+  }
+  if (!played.disk_failure.empty()) {
+    reason += ": " + played.disk_failure;
+  } else if (trip.cause == TripCause::recorder_stalled) {
+    reason += outbox.overdue() ? ": the disk took longer over a finished point than [output] "
+                                 "max_lag_s allows"
+                               : ": the queue in front of it is full";
+  }
+  return reason;
+}
+
+// Once more after making room. Says what the disk said where that failed, too.
+std::string put_down_end(record::SweepWriter& writer, const RunEnd& end) {
+  const auto put_down = [&] {
+    writer.set("dropped_samples", std::to_string(end.dropped_samples));
+    writer.end_part(end.outcome, end.reason);
+  };
+  try {
+    try {
+      put_down();
+    } catch (const record::SweepFileError&) {
+      if (!writer.rescue()) throw;
+      put_down();
+    }
+    writer.finish();
+    return {};
+  } catch (const record::SweepFileError& error) {
+    return error.what();
+  }
+}
+
+void refuse_other_dwells(const record::UnfinishedRun& earlier, const std::string& path,
+                         const SweepRunner& runner) {
+  SweepPlan reached{.rate_hz = earlier.stored.plan.rate_hz, .dwells = {}};
+  for (std::size_t i = 0; i < earlier.finished.known_dwells && i < runner.dwells().size(); ++i) {
+    reached.dwells.push_back(*runner.dwells()[i]);
+  }
+  record::refuse_other_plan(path, earlier.stored.plan, reached);
+}
+
+}  // namespace
+
+record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan) {
+  record::RunInfo info{
+      .rig_name = rig.file->name(),
+      .rig_text = rig.file->text(),
+      .clock = rig.clock == config::ClockKind::virtual_time ? "virtual" : "monotonic",
+      .channels = {{"command", rig.actuator.unit}, {"applied", rig.actuator.unit}},
+      .plan = plan};
+  for (const config::Channel& sensor : rig.sensors)
+    info.channels.push_back({sensor.name, sensor.unit});
+  return info;
+}
+
+int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedRunOptions& options,
+               const OpenSweepFile& open_file, const record::UnfinishedRun* earlier) {
+  const config::Rig& rig = configured.rig();
+  Clock& clock = configured.clock();
+  const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
+  RunControl control;
+  const StopOnSignal stop_on_signal{control};
+  RunTeller teller{options.voice, options.table, rig, plan};
+  const std::unique_ptr<LiveView> view =
+      options.serve ? std::make_unique<LiveView>(*options.serve, rig, plan, clock, control)
+                    : nullptr;
+  teller.plan(view ? view->url() : "");
+
+  const std::unique_ptr<record::SweepWriter> writer = open_file();
+  record_grants(*writer, loop->grants());
+  const bool in_real_time = rig.clock == config::ClockKind::monotonic;
+  Outbox outbox{outbox_slots, outbox_backlog,
+                in_real_time ? Outbox::WhenFull::keep : Outbox::WhenFull::wait,
+                static_cast<std::uint64_t>(std::ceil(rig.max_lag_s * rig.rate_hz))};
+  Guard guard{rig.guard, clock.grid().period_s()};
+  RunnerSettings settings = rig.runner;
+  if (view) settings.record_samples = true;
+  std::unique_ptr<SweepRunner> runner;
+  bool to_measure = true;
+  try {
+    configured.open();
+    runner = std::make_unique<SweepRunner>(plan, settings, view ? view->clock() : clock,
+                                           configured.actuator(), configured.sensors(), guard,
+                                           outbox, &configured);
+    if (earlier != nullptr) {
+      to_measure = runner->go_on(earlier->finished);
+      refuse_other_dwells(*earlier, writer->path(), *runner);
+      control.dwell.store(earlier->finished.dwells);
+      teller.resume(earlier->finished.points);
+      for (const Point& point : earlier->finished.points) {
+        if (view) view->run().take(point);
+      }
+    }
+    if (to_measure) configured.arm();
+    writer->begin_part(earlier != nullptr ? earlier->start : record::PartStart{});
+  } catch (...) {
+    writer->discard();
+    throw;
+  }
+  ServiceNotifier service;
+  Played played;
+  if (to_measure) {
+    const bool keep_samples = rig.runner.record_samples || !view;
+    played = play(plan, *loop, *runner, control, outbox, *writer,
+                  {.teller = teller,
+                   .service = service,
+                   .view = view.get(),
+                   .samples = keep_samples ? record::Recorder::Samples::written
+                                           : record::Recorder::Samples::watched,
+                   .tick_s = in_real_time ? clock.grid().period_s() : 0.0});
+  }
+
+  service.stopping();
+  RunEnd end{.outcome = played.disk_failure.empty() ? outcome_name(played.outcome) : "stopped",
+             .reason = reason_of(played, outbox, configured),
+             .sweep_file = writer->path(),
+             .dropped_samples = rig.runner.record_samples ? outbox.dropped_samples() : 0};
+  if (const std::string unsaid = put_down_end(*writer, end); !unsaid.empty()) {
+    end.outcome = "stopped";
+    end.reason += (end.reason.empty() ? "" : "; not in the file, ") + unsaid;
+  }
+  if (options.report) end.report_file = report_beside(writer->path());
+  if (view) view->finish(end);
+  teller.end(end);
+  return exit_code(end.outcome);
+}
+
+}  // namespace sinerig::cli

@@ -1,0 +1,67 @@
+#include "cli/wall_time.h"
+
+#include <algorithm>
+#include <chrono>
+#include <ctime>
+#include <thread>
+
+namespace sinerig::cli {
+
+namespace {
+
+constexpr std::chrono::milliseconds look_interval{200};
+
+std::string formatted(const std::tm& parts, const char* format) {
+  char text[40];
+  std::strftime(text, sizeof text, format, &parts);
+  return text;
+}
+
+}  // namespace
+
+std::int64_t SystemTime::now_s() {
+  return std::time(nullptr);
+}
+
+bool SystemTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) {
+  while (stop_requests.load() == 0 && now_s() < time_s) std::this_thread::sleep_for(look_interval);
+  return stop_requests.load() == 0;
+}
+
+bool PassingTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) {
+  now_s_ = std::max(now_s_, time_s);
+  return stop_requests.load() == 0;
+}
+
+std::int64_t next_time_of_day(std::int64_t from_s, int second_of_day) {
+  const std::time_t from = from_s;
+  std::tm parts{};
+  localtime_r(&from, &parts);
+  const auto on_day = [&](int days) {
+    std::tm then = parts;
+    then.tm_mday += days;
+    then.tm_hour = second_of_day / 3600;
+    then.tm_min = second_of_day / 60 % 60;
+    then.tm_sec = second_of_day % 60;
+    then.tm_isdst = -1;  // whatever the rules say of that day
+    return static_cast<std::int64_t>(std::mktime(&then));
+  };
+  const std::int64_t today = on_day(0);
+  return today >= from_s ? today : on_day(1);
+}
+
+std::string utc_text(std::int64_t time_s) {
+  const std::time_t time = time_s;
+  std::tm parts{};
+  gmtime_r(&time, &parts);
+  return formatted(parts, "%Y-%m-%dT%H:%M:%SZ");
+}
+
+std::string local_time_text(std::int64_t time_s) {
+  const std::time_t time = time_s;
+  std::tm parts{};
+  localtime_r(&time, &parts);
+  return formatted(parts, "%H:%M:%S");
+}
+
+}  // namespace sinerig::cli

@@ -1,0 +1,190 @@
+#include "record/unfinished_run.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "record/schema.h"
+
+namespace sinerig::record {
+
+namespace {
+
+using Tables = std::map<std::string, std::string>;  // SQL by name
+
+Tables tables_of(Database& database) {
+  Tables tables;
+  Statement rows{database, "SELECT name, sql FROM sqlite_master WHERE type = 'table'"};
+  while (rows.step()) tables.emplace(rows.text(0), rows.text(1));
+  return tables;
+}
+
+// A run that was killed before its plan was on the disk leaves a database with nothing in it.
+void refuse_not_begun(const std::string& path) {
+  Database database{path, Database::Mode::read};
+  if (!tables_of(database).empty()) return;
+  throw SweepFileError(path +
+                       ": is not a sweep file, or one whose run was killed before it began: "
+                       "there is nothing to resume");
+}
+
+void refuse_other_layout(const std::string& path, Database& database) {
+  Database fresh{":memory:", Database::Mode::create};
+  fresh.execute(schema_sql);
+  const Tables stored = tables_of(database);
+  for (const auto& [name, sql] : tables_of(fresh)) {
+    const auto found = stored.find(name);
+    if (found != stored.end() && found->second == sql) continue;
+    throw SweepFileError(path + ": was begun by another version of sinerig, whose table `" + name +
+                         "` is not this one's; resume it with that version");
+  }
+}
+
+template <typename Enum>
+Enum named(const std::string& name, Enum last) {
+  for (std::uint8_t i = 0; i < static_cast<std::uint8_t>(last); ++i) {
+    if (name == to_string(static_cast<Enum>(i))) return static_cast<Enum>(i);
+  }
+  return last;
+}
+
+Point point_of(const StoredPoint& stored, std::size_t pair) {
+  return {.dwell = stored.dwell,
+          .tone = static_cast<std::uint16_t>(stored.tone),
+          .pair = static_cast<std::uint16_t>(pair),
+          .input = static_cast<std::uint16_t>(stored.input),
+          .output = static_cast<std::uint16_t>(stored.output),
+          .status = named(stored.status, PointStatus::stopped),
+          .reason = named(stored.reason, PointReason::guard_trip),
+          .reason_value = stored.reason_value,
+          .frequency_hz = stored.frequency_hz,
+          .response = stored.response,
+          .covariance = stored.covariance,
+          .dof = stored.dof,
+          .gain_interval_db = stored.gain_interval_db,
+          .phase_interval_deg = stored.phase_interval_deg,
+          .input_amplitude = stored.input_amplitude,
+          .output_amplitude = stored.output_amplitude,
+          .snr_db = stored.snr_db,
+          .distortion = stored.distortion,
+          .drift_per_s = stored.drift_per_s,
+          .samples = stored.samples,
+          .lost = stored.lost,
+          .seconds = stored.seconds};
+}
+
+std::uint32_t finished_dwells(const StoredRun& run) {
+  std::set<std::uint32_t> ended;
+  for (const StoredTiming& timing : run.timings) ended.insert(timing.dwell);
+  for (const StoredResponse& response : run.responses) {
+    for (const StoredPoint& point : response.points) {
+      if (point.status == to_string(PointStatus::stopped)) ended.erase(point.dwell);
+    }
+  }
+  std::uint32_t finished = 0;
+  while (ended.contains(finished)) ++finished;
+  return finished;
+}
+
+std::vector<Point> points_of(const StoredRun& run, std::uint32_t dwells) {
+  std::vector<Point> points;
+  for (std::size_t pair = 0; pair < run.responses.size(); ++pair) {
+    for (const StoredPoint& point : run.responses[pair].points) {
+      if (point.dwell < dwells) points.push_back(point_of(point, pair));
+    }
+  }
+  std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
+    return std::tie(a.dwell, a.tone, a.pair) < std::tie(b.dwell, b.tone, b.pair);
+  });
+  return points;
+}
+
+std::vector<Lesson> lessons_of(Database& database) {
+  std::vector<Lesson> lessons;
+  Statement rows{database,
+                 "SELECT dwell, attempt, tone, response, re, im, input_amplitude, white, scatter, "
+                 "scatter_dof, residual_rms FROM lesson ORDER BY dwell, attempt, response, tone"};
+  while (rows.step()) {
+    lessons.push_back({.dwell = static_cast<std::uint32_t>(rows.integer(0)),
+                       .attempt = static_cast<std::uint32_t>(rows.integer(1)),
+                       .tone = static_cast<std::uint16_t>(rows.integer(2)),
+                       .pair = static_cast<std::uint16_t>(rows.integer(3)),
+                       .response = {rows.number(4), rows.number(5)},
+                       .input_amplitude = rows.number(6),
+                       .white = rows.number(7),
+                       .scatter = rows.number(8),
+                       .scatter_dof = rows.number(9),
+                       .residual_rms = rows.number(10)});
+  }
+  return lessons;
+}
+
+std::int64_t one_number(Database& database, const std::string& query) {
+  Statement row{database, query};
+  return row.step() ? row.integer(0) : 0;
+}
+
+PartStart next_start(Database& database, std::uint32_t dwell) {
+  const std::string here = " WHERE dwell = " + std::to_string(dwell);
+  return {.dwell = dwell,
+          .tick = static_cast<std::uint64_t>(one_number(
+              database,
+              "SELECT 1 + max(ifnull((SELECT max(first_tick + ticks + skipped) FROM timing), -1), "
+              "ifnull((SELECT max(tick) FROM event), -1), "
+              "ifnull((SELECT max(tick) FROM sample), -1), "
+              "ifnull((SELECT max(first_tick + block_samples) FROM block JOIN dwell ON "
+              "dwell.id = block.dwell), -1), "
+              "ifnull((SELECT max(first_tick) FROM part), -1))")),
+          .attempt = static_cast<std::uint32_t>(one_number(
+              database, "SELECT 1 + max(ifnull((SELECT max(attempt) FROM block" + here +
+                            "), -1), ifnull((SELECT max(attempt) FROM lesson" + here + "), -1))"))};
+}
+
+bool same(const Dwell& a, const Dwell& b) {
+  const auto same_tone = [](const Tone& x, const Tone& y) {
+    return x.cycles == y.cycles && x.amplitude == y.amplitude && x.phase_rad == y.phase_rad;
+  };
+  return a.asked_hz == b.asked_hz && a.block_samples == b.block_samples &&
+         a.ramp_samples == b.ramp_samples && a.settle_samples == b.settle_samples &&
+         a.blocks == b.blocks && a.max_samples == b.max_samples && a.sub_band == b.sub_band &&
+         std::equal(a.tones.begin(), a.tones.end(), b.tones.begin(), b.tones.end(), same_tone);
+}
+
+}  // namespace
+
+UnfinishedRun read_unfinished(const std::string& path) {
+  refuse_not_begun(path);
+  UnfinishedRun run{.stored = read_sweep(path), .finished = {}, .start = {}};
+  Database database{path, Database::Mode::read};
+  refuse_other_layout(path, database);
+  const std::uint32_t dwells = finished_dwells(run.stored);
+  run.finished = {.dwells = dwells,
+                  .points = points_of(run.stored, dwells),
+                  .lessons = lessons_of(database),
+                  .known_dwells = static_cast<std::uint32_t>(run.stored.plan.dwells.size())};
+  run.start = next_start(database, dwells);
+  return run;
+}
+
+void refuse_other_plan(const std::string& path, const SweepPlan& stored, const SweepPlan& plan) {
+  const std::size_t dwells = std::min(plan.dwells.size(), stored.dwells.size());
+  for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
+    if (plan.rate_hz == stored.rate_hz && i < dwells && same(plan.dwells[i], stored.dwells[i])) {
+      continue;
+    }
+    throw SweepFileError(path + ": this sinerig plans dwell " + std::to_string(i + 1) +
+                         " of its rig file differently than the one that began the run; resume it "
+                         "with that version");
+  }
+}
+
+bool can_be_resumed(const std::string& path) noexcept {
+  try {
+    return !read_unfinished(path).done();
+  } catch (...) {
+    return false;
+  }
+}
+
+}  // namespace sinerig::record

@@ -1,0 +1,33 @@
+// A sweep file whose run did not end: how far it came, and what is needed to go on.
+#pragma once
+
+#include <string>
+
+#include "record/sweep_reader.h"
+#include "record/sweep_writer.h"
+#include "sweep/runner.h"
+
+namespace sinerig::record {
+
+struct UnfinishedRun {
+  StoredRun stored;
+  FinishedDwells finished;
+  PartStart start;  // of the part to come
+
+  // The run ended by itself: there is nothing to resume.
+  bool done() const { return stored.fact("outcome") == "done"; }
+};
+
+// A dwell is finished when its timing is on record, which is written last, and none of its points
+// is `stopped`; the first that is not is where the run goes on. Throws SweepFileError for what is
+// no sweep file, and for one that this version would have laid out differently.
+UnfinishedRun read_unfinished(const std::string& path);
+
+// Throws SweepFileError naming the first dwell that differs in the stored plan. Dwells that
+// refinement added are left out.
+void refuse_other_plan(const std::string& path, const SweepPlan& stored, const SweepPlan& plan);
+
+// Whether `sinerig resume` would go on with it; false for whatever cannot be read.
+bool can_be_resumed(const std::string& path) noexcept;
+
+}  // namespace sinerig::record

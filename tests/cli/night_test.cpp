@@ -1,0 +1,235 @@
+// `sinerig night`: several sweeps as one job.
+#include <filesystem>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "cli/night_command.h"
+#include "record/database.h"
+#include "record/sweep_reader.h"
+#include "sim/sim_driver.h"
+#include "support/process.h"
+
+namespace sinerig {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+constexpr const char* rig_text =
+    "[loop]\nrate_hz = 500\n"
+    "[sweep]\nstart_hz = 1\nstop_hz = 50\npoints = 5\namplitude = 0.5\nintegrate_s = 1\n"
+    "[limits]\n[actuator]\n[sensor.y]\nnoise_rms = 1e-3\n"
+    "[plant]\nkind = \"transfer_function\"\nnum = [60]\nden = [1, 60]\n";
+
+class Night : public test::ProgramTest {
+ protected:
+  Night() { write("axis.toml", rig_text); }
+
+  void job(const std::string& sweeps, const std::string& keys = "") const {
+    write("night.toml", "[night]\nfolder = \"out\"\n" + keys + sweeps);
+  }
+  nlohmann::json summary() const { return nlohmann::json::parse(read("out/summary.json")); }
+};
+
+// Remembers what it was asked to wait for.
+class WatchedTime final : public cli::WallTime {
+ public:
+  explicit WatchedTime(std::int64_t start_s) : time_{start_s} {}
+  std::int64_t now_s() override { return time_.now_s(); }
+  bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) override {
+    waits.push_back(time_s - now_s());
+    return time_.wait_until(time_s, stop_requests);
+  }
+  void pass(double seconds) override { time_.pass(seconds); }
+
+  std::vector<std::int64_t> waits;
+
+ private:
+  cli::PassingTime time_;
+};
+
+TEST_F(Night, RunsEverySweepAndTellsWhatChanged) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 3\n"
+      "[[night.sweep]]\nname = \"small\"\nrig = \"axis.toml\"\nset.sweep.amplitude = 0.25\n");
+  const auto ran = run({"night", "night.toml"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  EXPECT_THAT(ran.err, HasSubstr("axis-2, 2 of 4"));
+  EXPECT_THAT(ran.out, HasSubstr("axis-3 y: same in 5 points; most at "));
+  EXPECT_EQ(read("out/summary.txt"), ran.out.substr(ran.out.find("night    night.toml")));
+  const auto json = summary();
+  EXPECT_EQ(json.at("changed"), false);
+  ASSERT_EQ(json.at("sweeps").size(), 4U);
+  EXPECT_EQ(json["sweeps"][1].at("outcome"), "done");
+  EXPECT_EQ(json["sweeps"][1].at("good"), 5);
+  EXPECT_EQ(json["sweeps"][1].at("differences").at(0).at("points").size(), 5U);
+  const auto small = record::read_sweep(path("out/small-1.sweep"));
+  EXPECT_THAT(small.fact("rig_text"), HasSubstr("amplitude = 0.25\n"));
+  EXPECT_NEAR(small.responses.at(0).points.at(0).input_amplitude, 0.25, 1e-9);
+  // A noise of its own for each repeat: otherwise their agreement would say nothing.
+  const auto first = record::read_sweep(path("out/axis-1.sweep"));
+  const auto second = record::read_sweep(path("out/axis-2.sweep"));
+  EXPECT_NE(first.responses.at(0).points.at(0).response,
+            second.responses.at(0).points.at(0).response);
+  EXPECT_THAT(second.fact("rig_text"), HasSubstr("seed = 2"));
+}
+
+TEST_F(Night, CalledAgainDoesNothingTwice) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  ASSERT_EQ(run({"night", "night.toml"}).code, 0);
+  const std::string before = read("out/axis-1.sweep") + read("out/axis-2.sweep");
+  const std::string summary_before = read("out/summary.txt");
+  EXPECT_EQ(run({"night", "night.toml", "--quiet"}).code, 0);
+  EXPECT_EQ(read("out/axis-1.sweep") + read("out/axis-2.sweep"), before);
+  EXPECT_EQ(read("out/summary.txt"), summary_before);
+}
+
+TEST_F(Night, GoesOnWhereItWasKilled) {
+  std::string text = rig_text;
+  text.insert(text.find("rate_hz"), "clock = \"monotonic\"\n");
+  text.replace(text.find("integrate_s = 1"), 15, "integrate_s = 0.2");
+  write("slow.toml", text);
+  job("[[night.sweep]]\nrig = \"axis.toml\"\n[[night.sweep]]\nrig = \"slow.toml\"\n");
+  {
+    test::Program program{{"night", "night.toml", "--json"}, folder_};
+    std::string line;
+    do line = program.read_line();
+    while (!line.empty() && line.find("\"slow\"") == std::string::npos);
+    program.read_line();  // the plan
+    EXPECT_THAT(program.read_line(), HasSubstr("\"point\""));
+    program.send(SIGKILL);
+    program.finish();
+  }
+  const std::string axis = read("out/axis-1.sweep");
+  const auto again = run({"night", "night.toml"});
+  EXPECT_EQ(again.code, 0) << again.err;
+  EXPECT_THAT(again.err, HasSubstr("slow-1, 2 of 2, goes on"));
+  EXPECT_EQ(read("out/axis-1.sweep"), axis);
+  EXPECT_EQ(record::read_sweep(path("out/slow-1.sweep")).parts.size(), 2U);
+  EXPECT_EQ(summary().at("sweeps").at(1).at("parts"), 2);
+}
+
+TEST_F(Night, IsStoppedByASignalAndResumed) {
+  std::string text = rig_text;
+  text.insert(text.find("rate_hz"), "clock = \"monotonic\"\n");
+  write("slow.toml", text);
+  job("[[night.sweep]]\nrig = \"slow.toml\"\nrepeat = 2\n");
+  test::Program program{{"night", "night.toml", "--json"}, folder_};
+  for (int i = 0; i < 3; ++i) program.read_line();  // sweep, plan, point
+  const auto second = run({"night", "night.toml"});
+  EXPECT_EQ(second.code, 2);
+  EXPECT_THAT(second.err, HasSubstr("another sinerig is at work on this night"));
+  program.send(SIGINT);
+  EXPECT_EQ(program.finish().code, 4);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "interrupted");
+  EXPECT_EQ(summary().at("sweeps").at(1).at("outcome"), "not run");
+}
+
+TEST_F(Night, StopsInTheMidstOfWaiting) {
+  std::string text = rig_text;
+  text.insert(text.find("rate_hz"), "clock = \"monotonic\"\n");
+  write("slow.toml", text);
+  job("[[night.sweep]]\nrig = \"slow.toml\"\nstart_after_s = 100000\n");
+  // The name of the file that it locks appears when it is ready for signals.
+  test::Program program{{"night", "night.toml"}, folder_};
+  while (!fs::exists(path("out/night.json"))) std::this_thread::yield();
+  program.send(SIGTERM);
+  EXPECT_EQ(program.finish().code, 4);
+}
+
+TEST_F(Night, WaitsForTheTimesOfTheJob) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\npause_s = 60\nstart_after_s = 1000\n");
+  WatchedTime time{1772398800};
+  const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+  EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 0);
+  EXPECT_EQ(time.waits, (std::vector<std::int64_t>{1000, 60}));
+  EXPECT_GT(time.now_s(), 1772398800 + 1060) << "sweeps take their time, too";
+}
+
+TEST_F(Night, ThatBeganYesterdayDoesNotWaitForTomorrow) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nstart_after_s = 3600\n");
+  fs::create_directories(path("out"));
+  write("out/night.json", "{\"format\": \"sinerig-night\", \"began_s\": 1772398800}");
+  WatchedTime time{1772398800 + 20000};  // the machine was off meanwhile
+  const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+  EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 0);
+  EXPECT_EQ(time.waits, (std::vector<std::int64_t>{0}));
+}
+
+TEST_F(Night, ASweepStoppedByALimitIsFollowedByTheNextOrNot) {
+  const std::string sweeps =
+      "[[night.sweep]]\nname = \"narrow\"\nrig = \"axis.toml\"\nset.sensor.y.max = 0.1\n"
+      "[[night.sweep]]\nrig = \"axis.toml\"\n";
+  job(sweeps);
+  EXPECT_EQ(run({"night", "night.toml"}).code, 3);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "stopped");
+  EXPECT_THAT(summary()["sweeps"][0].at("detail").get<std::string>(), HasSubstr("limit 0.1"));
+  EXPECT_EQ(summary()["sweeps"][1].at("outcome"), "done");
+  EXPECT_EQ(run({"night", "night.toml"}).code, 3);
+  EXPECT_EQ(record::read_sweep(path("out/narrow-1.sweep")).parts.size(), 1U) << "it had its chance";
+
+  fs::remove_all(path("out"));
+  job(sweeps, "on_stop = \"stop\"\n");
+  EXPECT_EQ(run({"night", "night.toml"}).code, 3);
+  EXPECT_EQ(summary().at("sweeps").at(1).at("outcome"), "not run");
+  EXPECT_EQ(run({"night", "night.toml"}).code, 3);
+  EXPECT_EQ(record::read_sweep(path("out/narrow-1.sweep")).parts.size(), 2U) << "tried again";
+}
+
+TEST_F(Night, ARigThatChangedMeanwhileIsRefused) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\n");
+  ASSERT_EQ(run({"night", "night.toml"}).code, 0);
+  write("axis.toml", std::string{rig_text} + "# edited\n");
+  const auto again = run({"night", "night.toml"});
+  EXPECT_EQ(again.code, 2);
+  EXPECT_THAT(again.err, HasSubstr("out/axis-1.sweep: was made from another rig file or other "
+                                   "values than axis.toml now gives"));
+}
+
+TEST_F(Night, ChangesBetweenRepeatsAreExitCodeFive) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  // The second repeat as a rig would have measured it whose gain has risen by a fifth.
+  std::string other = rig_text;
+  other.replace(other.find("num = [60]"), 10, "num = [72]\nseed = 2");
+  write("other.toml", other);
+  fs::create_directories(path("out"));
+  ASSERT_EQ(run({"run", "other.toml", "-o", "out/axis-2.sweep"}).code, 0);
+  std::string as_if = rig_text;
+  as_if.insert(as_if.find("[plant]\n") + 8, "seed = 2\n");
+  {
+    record::Database database{path("out/axis-2.sweep"), record::Database::Mode::write};
+    record::Statement text{database, "UPDATE run SET value = ? WHERE key = 'rig_text'"};
+    text.bind(as_if).run();
+  }
+  const auto ran = run({"night", "night.toml"});
+  EXPECT_EQ(ran.code, 5) << ran.err;
+  EXPECT_THAT(ran.out, HasSubstr("axis-2 y: 5 of 5 points changed; most at "));
+  EXPECT_EQ(summary().at("changed"), true);
+}
+
+TEST_F(Night, RefusesABadJobBeforeAnythingMoves) {
+  const auto refusal = [&](const std::string& sweeps, const std::string& keys = "") {
+    job(sweeps, keys);
+    const auto ran = run({"night", "night.toml"});
+    EXPECT_EQ(ran.code, 2);
+    EXPECT_FALSE(fs::exists(path("out")));
+    return ran.err;
+  };
+  const std::string sweep = "[[night.sweep]]\nrig = \"axis.toml\"\n";
+  EXPECT_THAT(refusal(""), HasSubstr("[night] sweep: is missing; add a section [[night.sweep]]"));
+  EXPECT_THAT(refusal(sweep, "on_stop = \"wait\"\n"),
+              HasSubstr("must be one of \"next\" \"stop\""));
+  EXPECT_THAT(refusal(sweep + "start_at = \"25:00\"\n"),
+              HasSubstr("start_at = '25:00': must be a local time of day, \"22:30\""));
+  EXPECT_THAT(refusal(sweep + "repeats = 2\n"), HasSubstr("unknown key; did you mean repeat?"));
+  EXPECT_THAT(refusal(sweep + sweep), HasSubstr("\"axis\" is the name of an earlier sweep"));
+  EXPECT_THAT(refusal(sweep + "name = \"a/b\"\n"), HasSubstr("must be letters, digits, _ and -"));
+  EXPECT_THAT(refusal(sweep + "set.sweep.amplitud = 1\n"),
+              HasSubstr("[sweep] amplitud: unknown key; did you mean amplitude?"));
+  EXPECT_THAT(refusal("[[night.sweep]]\nrig = \"none.toml\"\n"),
+              HasSubstr("none.toml: cannot be read"));
+}
+
+}  // namespace
+}  // namespace sinerig

@@ -1,0 +1,301 @@
+// The file of a run in several parts: nothing finished changes, what was interrupted is repeated.
+#include <cmath>
+#include <filesystem>
+
+#include <gmock/gmock.h>
+#include <sqlite3.h>
+
+#include "record/recorder.h"
+#include "record/schema.h"
+#include "record/sweep_path.h"
+#include "record/unfinished_run.h"
+
+namespace sinerig::record {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+RunInfo an_info() {
+  SweepSettings sweep;
+  sweep.start_hz = 1.0;
+  sweep.stop_hz = 10.0;
+  sweep.points = 4;
+  sweep.amplitude = 0.5;
+  return {.rig_name = "rig.toml",
+          .rig_text = "# a rig\n",
+          .clock = "virtual",
+          .channels = {{"command", "V"}, {"applied", "V"}, {"gyro", "rad/s"}},
+          .plan = plan_sweep(sweep, {}, 1000.0)};
+}
+
+Point a_point(std::uint32_t dwell, PointStatus status = PointStatus::good) {
+  Point point;
+  point.dwell = dwell;
+  point.frequency_hz = 1.25 * (dwell + 1);
+  point.response = {1.0 / (dwell + 3.0), -2.0 / 7.0};
+  point.status = status;
+  return point;
+}
+
+class ResumedFile : public testing::Test {
+ protected:
+  ResumedFile() {
+    fs::remove_all(folder_);
+    fs::create_directories(folder_);
+  }
+  ~ResumedFile() override { fs::remove_all(folder_); }
+
+  std::string path() const { return folder_ / "run.sweep"; }
+
+  void dwell(SweepWriter& writer, std::uint32_t id, std::uint64_t first_tick,
+             PointStatus status = PointStatus::good) {
+    writer.write(Block{.dwell = id, .channel = 2, .first_tick = first_tick + 10});
+    writer.write(Lesson{.dwell = id, .response = {1.0, 2.0}, .white = 1e-9, .scatter_dof = 6.0});
+    writer.write(a_point(id, status));
+    writer.write(DwellTiming{.dwell = id, .first_tick = first_tick, .ticks = 5000});
+  }
+
+  // Two dwells, then stopped in the third.
+  void first_part() {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    dwell(writer, 0, 0);
+    dwell(writer, 1, 5000);
+    dwell(writer, 2, 10000, PointStatus::stopped);
+    writer.end_part("interrupted", "stop requested");
+    writer.finish();
+  }
+  std::vector<std::string> texts(const std::string& query) const {
+    Database database{path(), Database::Mode::read};
+    Statement rows{database, query};
+    std::vector<std::string> all;
+    while (rows.step()) all.push_back(rows.text(0));
+    return all;
+  }
+
+  fs::path folder_ =
+      fs::path{testing::TempDir()} /
+      (std::string{"resumed-"} + testing::UnitTest::GetInstance()->current_test_info()->name());
+};
+
+TEST_F(ResumedFile, GoesOnWithTheDwellThatWasStopped) {
+  first_part();
+  const UnfinishedRun run = read_unfinished(path());
+  EXPECT_FALSE(run.done());
+  EXPECT_EQ(run.finished.dwells, 2U);
+  EXPECT_EQ(run.finished.known_dwells, 4U);
+  ASSERT_EQ(run.finished.points.size(), 2U);
+  EXPECT_EQ(run.finished.points[1].response, a_point(1).response);
+  EXPECT_EQ(run.finished.lessons.size(), 3U);
+  EXPECT_EQ(run.start.dwell, 2U);
+  EXPECT_EQ(run.start.attempt, 1U);
+  EXPECT_GE(run.start.tick, 15000U);
+}
+
+TEST_F(ResumedFile, KeepsWhatWasFinishedAndReplacesTheStoppedPoint) {
+  first_part();
+  const auto before = texts("SELECT quote(re) || quote(im) FROM point WHERE dwell < 2");
+  const UnfinishedRun run = read_unfinished(path());
+  {
+    SweepWriter writer{path(), an_info()};
+    writer.begin_part(run.start);
+    dwell(writer, 2, 0);
+    dwell(writer, 3, 5000);
+    writer.end_part("done", "");
+    writer.finish();
+  }
+  EXPECT_EQ(texts("SELECT quote(re) || quote(im) FROM point WHERE dwell < 2"), before);
+  EXPECT_EQ(texts("SELECT status FROM point"), (std::vector<std::string>(4, "good")));
+  EXPECT_EQ(texts("SELECT attempt FROM block WHERE dwell = 2"),
+            (std::vector<std::string>{"0", "1"}));
+  const StoredRun stored = read_sweep(path());
+  ASSERT_EQ(stored.parts.size(), 2U);
+  EXPECT_EQ(stored.parts[0].outcome, "interrupted");
+  EXPECT_EQ(stored.parts[0].detail, "stop requested");
+  EXPECT_EQ(stored.parts[1].outcome, "done");
+  EXPECT_EQ(stored.parts[1].first_dwell, 2U);
+  // Ticks count on: no two of them are the same.
+  EXPECT_EQ(stored.parts[1].first_tick, run.start.tick);
+  EXPECT_EQ(stored.timings.at(2).first_tick, run.start.tick);
+  EXPECT_EQ(stored.timings.at(3).first_tick, run.start.tick + 5000);
+  EXPECT_EQ(stored.fact("outcome"), "done");
+  EXPECT_TRUE(read_unfinished(path()).done());
+  EXPECT_FALSE(can_be_resumed(path()));
+}
+
+TEST_F(ResumedFile, CallsAPartWithoutAnEndKilled) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    dwell(writer, 0, 0);
+  }
+  EXPECT_EQ(read_sweep(path()).parts.at(0).outcome, "");
+  const UnfinishedRun run = read_unfinished(path());
+  SweepWriter writer{path(), an_info()};
+  writer.begin_part(run.start);
+  const StoredRun stored = read_sweep(path());
+  ASSERT_EQ(stored.parts.size(), 2U);
+  EXPECT_EQ(stored.parts[0].outcome, "killed");
+  EXPECT_EQ(stored.parts[0].finished_utc, "");
+  EXPECT_EQ(stored.parts[1].outcome, "");
+  EXPECT_EQ(stored.fact("outcome"), "");
+}
+
+TEST_F(ResumedFile, StaysAsItIsWhenThePartNeverBegins) {
+  first_part();
+  const auto facts = texts("SELECT key || value FROM run");
+  {
+    SweepWriter writer{path(), an_info()};
+    writer.discard();
+  }
+  EXPECT_EQ(texts("SELECT key || value FROM run"), facts);
+  EXPECT_EQ(read_sweep(path()).parts.size(), 1U);
+}
+
+TEST_F(ResumedFile, HasOneWriterAtATime) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  const std::string in_use = path() + ": is being written by a sinerig that still runs";
+  const auto refusal = [](const auto& open) -> std::string {
+    try {
+      open();
+    } catch (const FileInUse& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_THAT(refusal([&] { const SweepWriter second(path(), an_info()); }), HasSubstr(in_use));
+  EXPECT_THAT(refusal([&] { make_way(path(), true); }), HasSubstr(in_use));
+  EXPECT_THAT(refusal([&] { make_way(path(), false); }), HasSubstr(in_use));
+  writer.begin_part({});
+  dwell(writer, 0, 0);
+  EXPECT_EQ(read_sweep(path()).responses.at(0).points.size(), 1U) << "readers are not locked out";
+}
+
+TEST_F(ResumedFile, IsNamedWhenANewRunWouldTakeItsPlace) {
+  first_part();
+  try {
+    make_way(path(), false);
+    FAIL();
+  } catch (const FileExists& error) {
+    EXPECT_EQ(error.what(), path() +
+                                ": exists already, and its run was interrupted: `sinerig "
+                                "resume " +
+                                path() +
+                                "` goes on with it; choose another name "
+                                "with -o, or --force to replace it");
+  }
+}
+
+TEST_F(ResumedFile, OfAnotherPlanIsRefused) {
+  first_part();
+  const SweepPlan stored = read_unfinished(path()).stored.plan;
+  EXPECT_NO_THROW(refuse_other_plan(path(), stored, an_info().plan));
+  SweepPlan other = an_info().plan;
+  other.dwells[1].tones[0].amplitude *= 1.0 + 1e-15;
+  try {
+    refuse_other_plan(path(), stored, other);
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_EQ(error.what(), path() +
+                                ": this sinerig plans dwell 2 of its rig file differently than "
+                                "the one that began the run; resume it with that version");
+  }
+  other = an_info().plan;
+  other.dwells.push_back(other.dwells.back());
+  EXPECT_THROW(refuse_other_plan(path(), stored, other), SweepFileError);
+}
+
+TEST_F(ResumedFile, OfAnotherLayoutIsReadButNotResumed) {
+  first_part();
+  {
+    Database database{path(), Database::Mode::write};
+    database.execute("DROP TABLE part; DROP TABLE lesson; DROP TABLE durability");
+  }
+  const StoredRun stored = read_sweep(path());  // a file of before there were parts
+  EXPECT_TRUE(stored.parts.empty());
+  EXPECT_TRUE(stored.lag_s.empty());
+  EXPECT_EQ(stored.responses.at(0).points.size(), 3U);
+  try {
+    read_unfinished(path());
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("was begun by another version of sinerig, whose table "
+                                        "`durability` is not this one's"));
+  }
+}
+
+TEST_F(ResumedFile, NeverHoldsAPartOfADwellsPoints) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  writer.begin_part({});
+  writer.write(a_point(0));
+  writer.commit();  // the interval of events and samples has passed
+  EXPECT_TRUE(read_sweep(path()).responses.empty());
+  writer.write(DwellTiming{.dwell = 0});
+  EXPECT_EQ(read_sweep(path()).responses.at(0).points.size(), 1U);
+}
+
+TEST_F(ResumedFile, ToldPointsAreOnTheDisk) {
+  Outbox outbox{64, 64, Outbox::WhenFull::wait};
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  writer.begin_part({});
+  std::size_t on_disk = 0;
+  const auto observe = [&](const Record& record) {
+    if (!std::holds_alternative<Point>(record)) return;
+    const StoredRun stored = read_sweep(path());
+    on_disk += stored.responses.at(0).points.size();
+  };
+  Recorder recorder{outbox, writer, observe};
+  for (std::uint32_t id = 0; id < 3; ++id) {
+    outbox.put(a_point(id));
+    outbox.put(DwellTiming{.dwell = id});
+    // In virtual time the loop has waited for that.
+    EXPECT_EQ(read_sweep(path()).responses.at(0).points.size(), id + 1U);
+  }
+  outbox.close();
+  recorder.finish();
+  EXPECT_EQ(on_disk, 1U + 2U + 3U);
+}
+
+TEST_F(ResumedFile, KeepsHowFarTheDiskIsBehind) {
+  Outbox outbox{64, 64, Outbox::WhenFull::keep};
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  writer.begin_part({});
+  outbox.put(DwellTiming{.dwell = 0});
+  for (int tick = 0; tick < 250; ++tick) outbox.flush();
+  Recorder recorder{outbox, writer, {}, Recorder::Samples::written, 0.001};
+  outbox.close();
+  recorder.finish();
+  writer.finish();
+  EXPECT_NEAR(read_sweep(path()).lag_s.at(0), 0.25, 1e-12);
+}
+
+TEST_F(ResumedFile, HoldsRoomBackWhileItIsWritten) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    EXPECT_EQ(fs::file_size(path() + "-spare"), SpareRoom::bytes);
+  }
+  EXPECT_FALSE(fs::exists(path() + "-spare"));
+  try {
+    const SpareRoom nowhere{(folder_ / "no" / "such.sweep").string()};
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("such.sweep-spare: cannot be created: No such file"));
+  }
+}
+
+TEST(AnOutbox, StopsTheLoopWhenTheDiskIsTooLate) {
+  Outbox outbox{64, 64, Outbox::WhenFull::keep, 100};
+  for (int tick = 0; tick < 1000; ++tick) ASSERT_TRUE(outbox.flush());
+  outbox.put(DwellTiming{});
+  for (int tick = 0; tick < 100; ++tick) ASSERT_TRUE(outbox.flush());
+  EXPECT_EQ(outbox.acknowledge(), 100U);
+  outbox.put(DwellTiming{});
+  for (int tick = 0; tick < 100; ++tick) ASSERT_TRUE(outbox.flush());
+  EXPECT_FALSE(outbox.overdue());
+  EXPECT_FALSE(outbox.flush());
+  EXPECT_TRUE(outbox.overdue());
+}
+
+}  // namespace
+}  // namespace sinerig::record

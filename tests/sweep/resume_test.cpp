@@ -1,0 +1,142 @@
+// A sweep that goes on in its middle knows what it would have known.
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "support/virtual_run.h"
+
+namespace sinerig {
+namespace {
+
+using test::CollectingSink;
+
+sim::SimulatedRigSettings resonant_rig(double noise_rms) {
+  sim::SimulatedRigSettings rig;
+  rig.system = sim::from_transfer_function({400.0 * 3.0}, {1.0, 4.0, 400.0});
+  rig.sensors.resize(1);
+  rig.sensors[0].imperfections.noise_rms = noise_rms;
+  return rig;
+}
+
+SweepPlan levelled_plan() {
+  SweepSettings sweep;
+  sweep.start_hz = 0.5;
+  sweep.stop_hz = 20.0;
+  sweep.points = 12;
+  sweep.amplitude = 1.0;
+  sweep.level = {.response = 0.5, .most_response = 1.5, .least_amplitude = 1e-3, .retries = 2};
+  sweep.refine_points = 4;
+  sweep.refine_db = 0.05;
+  return plan_sweep(sweep, {}, 200.0);
+}
+
+struct Measured {
+  CollectingSink sink;
+  RunOutcome outcome;
+  bool to_measure = true;
+  std::size_t dwells = 0;
+};
+
+Measured run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells& finished) {
+  Measured run;
+  VirtualClock clock{TickGrid{plan.rate_hz}};
+  const sim::SimulatedRigSettings settings = resonant_rig(noise_rms);
+  sim::SimulatedRig rig{settings, clock};
+  Sensor* const sensors[] = {&rig.sensor(0)};
+  Guard guard{test::open_guard(1), clock.grid().period_s()};
+  SweepRunner runner{plan, {}, clock, rig.actuator(), sensors, guard, run.sink};
+  run.to_measure = runner.go_on(finished);
+  RunControl control;
+  if (run.to_measure) run.outcome = runner.run(control);
+  run.dwells = runner.dwells().size();
+  return run;
+}
+
+// What a file would hold of the first dwells of a run.
+FinishedDwells first_of(const Measured& run, std::uint32_t dwells, std::uint32_t known) {
+  FinishedDwells finished{.dwells = dwells, .points = {}, .lessons = {}, .known_dwells = known};
+  for (const Point& point : run.sink.points) {
+    if (point.dwell < dwells) finished.points.push_back(point);
+  }
+  for (const Lesson& lesson : run.sink.lessons) {
+    if (lesson.dwell < dwells) finished.lessons.push_back(lesson);
+  }
+  return finished;
+}
+
+std::vector<std::uint32_t> refined(const Measured& run) {
+  std::vector<std::uint32_t> candidates;
+  for (const Event& event : run.sink.events) {
+    if (event.kind == EventKind::refined) candidates.push_back(event.candidate);
+  }
+  return candidates;
+}
+
+class GoingOn : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
+  const SweepPlan plan = levelled_plan();
+  const Measured whole = run_from(plan, 0.0, {});
+  ASSERT_FALSE(whole.outcome.trip.tripped());
+  ASSERT_GT(whole.dwells, plan.dwells.size()) << "nothing was refined";
+  const std::uint32_t kept = GetParam();
+  const Measured rest = run_from(plan, 0.0, first_of(whole, kept, kept));
+  EXPECT_EQ(rest.outcome.dwells_done, whole.outcome.dwells_done);
+  ASSERT_EQ(rest.sink.points.size(), whole.sink.points.size() - kept);
+  for (std::size_t i = 0; i < rest.sink.points.size(); ++i) {
+    const Point& a = whole.sink.points[kept + i];
+    const Point& b = rest.sink.points[i];
+    EXPECT_EQ(a.dwell, b.dwell);
+    EXPECT_EQ(a.frequency_hz, b.frequency_hz);
+    // The level comes from the points before; the plant starts from rest instead of in motion.
+    EXPECT_NEAR(b.input_amplitude / a.input_amplitude, 1.0, 2e-3) << a.frequency_hz;
+    EXPECT_NEAR(std::abs(b.response / a.response - 1.0), 0.0, 6e-3) << a.frequency_hz;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Dwells, GoingOn, testing::Values(0U, 1U, 2U, 7U, 12U, 13U));
+
+TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
+  const SweepPlan plan = levelled_plan();
+  const Measured whole = run_from(plan, 0.01, {});
+  ASSERT_GE(whole.sink.lessons.size(), 12U);
+  // The amplitude of the first attempt follows from the recalled points alone, to the last bit.
+  const Measured rest = run_from(plan, 0.01, first_of(whole, 8, 8));
+  const auto amplitude_of = [](const Measured& run) {
+    for (const Block& block : run.sink.blocks) {
+      if (block.dwell == 8 && block.channel == applied_channel) return std::abs(block.coefficients.phasor());
+    }
+    return 0.0;
+  };
+  EXPECT_NEAR(amplitude_of(rest), amplitude_of(whole), 1e-12);
+  EXPECT_NE(amplitude_of(rest), 0.0);
+  // Without the lessons the colour of the noise would have to be learnt anew.
+  FinishedDwells forgetful = first_of(whole, 8, 8);
+  forgetful.lessons.clear();
+  const Measured again = run_from(plan, 0.01, forgetful);
+  EXPECT_GT(rest.sink.points.front().dof, again.sink.points.front().dof);
+}
+
+TEST(RestOfASweep, ChoosesTheSameRefinementsAndTellsOnlyOfNewOnes) {
+  const SweepPlan plan = levelled_plan();
+  const Measured whole = run_from(plan, 0.0, {});
+  const std::vector<std::uint32_t> all = refined(whole);
+  ASSERT_GE(all.size(), 2U);
+  // The first pass is done; the first added dwell may or may not have reached the file.
+  const auto first_pass = static_cast<std::uint32_t>(plan.dwells.size());
+  EXPECT_EQ(refined(run_from(plan, 0.0, first_of(whole, first_pass, first_pass))).front(), all[0]);
+  EXPECT_EQ(refined(run_from(plan, 0.0, first_of(whole, first_pass, first_pass + 1))).front(),
+            all[1]);
+}
+
+TEST(RestOfASweep, KnowsWhenNothingIsLeft) {
+  const SweepPlan plan = levelled_plan();
+  const Measured whole = run_from(plan, 0.0, {});
+  const auto all = static_cast<std::uint32_t>(whole.dwells);
+  const Measured rest = run_from(plan, 0.0, first_of(whole, all, all));
+  EXPECT_FALSE(rest.to_measure);
+  EXPECT_TRUE(rest.sink.events.empty());
+}
+
+}  // namespace
+}  // namespace sinerig
