@@ -1,5 +1,7 @@
 // `sinerig night`: several sweeps as one job.
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -206,6 +208,30 @@ TEST_F(Night, ChangesBetweenRepeatsAreExitCodeFive) {
   EXPECT_EQ(ran.code, 5) << ran.err;
   EXPECT_THAT(ran.out, HasSubstr("axis-2 y: 5 of 5 points changed; most at "));
   EXPECT_EQ(summary().at("changed"), true);
+}
+
+// The shipped job is the reference of every key; a key in a comment stands at its default.
+TEST_F(Night, TheShippedJobExplainsEveryKey) {
+  const std::string config = std::string{SINERIG_SOURCE_DIR} + "/config/";
+  std::ifstream stream{config + "night.toml"};
+  std::string text{std::istreambuf_iterator<char>{stream}, {}};
+  for (const char* key : {"folder", "on_stop", "tolerance_db", "tolerance_deg", "false_alarm",
+                          "rig", "name", "repeat", "pause_s", "start_at", "start_after_s"}) {
+    EXPECT_THAT(text, testing::ContainsRegex("\n(# )?" + std::string{key} + " = ")) << key;
+  }
+  for (std::size_t at = 0; (at = text.find("\n# ", at)) != std::string::npos; ++at) {
+    const std::string line = text.substr(at + 3, text.find('\n', at + 1) - at - 3);
+    if (line.find(" = ") != std::string::npos) text.erase(at + 1, 2);
+  }
+  for (std::size_t at = 0; (at = text.find("\"gimbal.toml\"", at)) != std::string::npos; ++at) {
+    text.replace(at, 13, "\"" + config + "gimbal.toml\"");
+  }
+  write("shipped.toml", text);
+  const cli::NightJob job = cli::read_night_job(path("shipped.toml"));
+  EXPECT_EQ(job.folder, path("night"));
+  ASSERT_EQ(job.sweeps.size(), 2U);
+  EXPECT_EQ(job.sweeps[0].second_of_day, 22 * 3600 + 1800);
+  EXPECT_EQ(cli::tasks_of(job).size(), 4U);
 }
 
 TEST_F(Night, RefusesABadJobBeforeAnythingMoves) {
