@@ -151,8 +151,9 @@ TEST_F(SweepFile, FromBeforeTheThreadsUsageWasKeptIsReadWithoutIt) {
   }
   EXPECT_TRUE(read_sweep(path()).usage());
   execute(path(),
-          "ALTER TABLE timing DROP COLUMN minor_faults; ALTER TABLE timing DROP COLUMN "
-          "major_faults; ALTER TABLE timing DROP COLUMN involuntary_switches");
+          "CREATE TABLE old AS SELECT dwell, first_tick, ticks, skipped, resettles, "
+          "max_lateness_ns, lateness_us FROM timing; DROP TABLE timing; ALTER TABLE old RENAME TO "
+          "timing");
   const StoredRun run = read_sweep(path());
   ASSERT_EQ(run.timings.size(), 1U);
   EXPECT_EQ(run.timings[0].ticks, 100U);
