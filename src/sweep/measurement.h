@@ -4,24 +4,21 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "sweep/estimator.h"
+#include "sweep/modal_settling.h"
 #include "sweep/noise_memory.h"
 #include "sweep/nonblocking.h"
 #include "sweep/plan.h"
+#include "sweep/point_interval.h"
 #include "sweep/records.h"
 #include "sweep/regression.h"
 #include "sweep/transient_memory.h"
 
 namespace sinerig {
-
-// Half widths of the 95 % intervals of gain and phase.
-struct Interval {
-  double gain_db = 0.0;
-  double phase_deg = 0.0;
-};
 
 // A pair of regression channels (0 is what was applied, 1… the sensors) whose ratio is a response.
 // The first pair is the one that settling and targets are judged on.
@@ -32,6 +29,11 @@ class Measurement {
   // Takes all memory for dwells of up to `max_bins` bins.
   Measurement(std::size_t channels, std::size_t max_bins, std::size_t max_tones, Pairs pairs,
               Judgement judgement, double rate_hz);
+
+  // What is known of the plant's modes: from here on the transients of dwells are modelled, where
+  // the judgement wants that. `noise_variance` per pair.
+  void know(const ModePrior& prior, std::span<const double> noise_variance,
+            double noise_dof) noexcept SINERIG_NONBLOCKING;
 
   void start(const Dwell& dwell) noexcept SINERIG_NONBLOCKING;
 
@@ -71,7 +73,12 @@ class Measurement {
   };
 
   void judge() noexcept;
-  Interval interval(const Result& result, double scale = 1.0) const noexcept;
+  Interval interval(const Result& result, double scale = 1.0) const noexcept {
+    return interval_of(result.estimate.response, result.variance, result.left, scale);
+  }
+  void start_modal() noexcept;
+  void add_modal(Phasor tone, std::span<const Observation> observations) noexcept;
+  void take_modal() noexcept;
   void restart() noexcept;
   void end_part() noexcept;
   Window current_window() noexcept;
@@ -98,6 +105,13 @@ class Measurement {
   std::vector<Stray> strays_;          // per tone
   TransientMemory transients_;         // of the first pair
   std::vector<double> omega_;          // per bin
+
+  // Where transients are modelled.
+  std::unique_ptr<ModalSettling> modal_;
+  std::unique_ptr<ModalStore> store_;
+  bool modal_live_ = false;    // this dwell is still the model's
+  bool by_model_ = false;      // … and it ended it
+  std::uint64_t blind_left_ = 0;
 
   const Dwell* dwell_ = nullptr;
   std::uint64_t samples_ = 0;  // since the start or the last disturbance

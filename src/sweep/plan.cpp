@@ -122,9 +122,9 @@ Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Ton
   const double settle_samples =
       settle_unit * (std::ceil(ramp_samples / settle_unit) + length(sweep.settle, settle_unit));
   const double blocks = std::max(1.0, length(sweep.integrate, block_samples));
-  const bool open_ended = sweep.has_target() || sweep.settling == Settling::detect;
+  const bool open_ended = sweep.has_target() || sweep.settling != Settling::fixed;
   double max_samples = settle_samples + blocks * block_samples;
-  if (sweep.settling == Settling::detect)
+  if (sweep.settling != Settling::fixed)
     max_samples += length(sweep.settle_max, block_samples) * block_samples;
   if (sweep.has_target()) max_samples += length(sweep.integrate_max, block_samples) * block_samples;
   if (max_samples > max_dwell_samples) {
@@ -142,6 +142,10 @@ Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Ton
   dwell.settle_samples = static_cast<std::uint64_t>(settle_samples);
   dwell.blocks = static_cast<std::uint32_t>(blocks);
   dwell.max_samples = static_cast<std::uint64_t>(max_samples);
+  if (sweep.settling == Settling::model) {
+    dwell.least_samples =
+        dwell.settle_samples + static_cast<std::uint64_t>(length(sweep.integrate, 1.0));
+  }
   dwell.harmonics = harmonic_count(sweep.harmonics, base, tones);
   for (Tone& tone : tones) tone.cycles *= static_cast<std::uint64_t>(bases);
   dwell.tones = std::move(tones);

@@ -14,8 +14,9 @@ namespace sinerig {
 
 enum class Spacing { logarithmic, linear, list };
 
-// How the end of the transient is known: waited for, or seen.
-enum class Settling { fixed, detect };
+// How the end of the transient is known: waited for, or seen; or it is measured along, with the
+// plant's modes in the regression, and its end need not be known.
+enum class Settling { fixed, detect, model };
 
 struct AmplitudeBreak {
   double frequency_hz;
@@ -121,6 +122,9 @@ struct Dwell {
   std::uint64_t settle_samples = 0;  // ramp included; waited for before anything is measured
   std::uint32_t blocks = 0;          // measured at least
   std::uint64_t max_samples = 0;     // of the whole dwell, wait included
+  // Of the whole dwell at least, where the transient is modelled: that needs no whole blocks. 0:
+  // all that min_samples() says.
+  std::uint64_t least_samples = 0;
 
   std::uint64_t min_samples() const { return settle_samples + blocks * block_samples; }
   double tone_hz(const Tone& tone, double rate_hz) const {

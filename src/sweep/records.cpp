@@ -15,6 +15,15 @@ const char* to_string(PointStatus status) noexcept {
   return "unknown";
 }
 
+const char* to_string(SettledBy way) noexcept {
+  switch (way) {
+    case SettledBy::wait: return "wait";
+    case SettledBy::detection: return "detection";
+    case SettledBy::model: return "model";
+  }
+  return "unknown";
+}
+
 const char* to_string(PointReason reason) noexcept {
   switch (reason) {
     case PointReason::none: return "";

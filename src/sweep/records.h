@@ -49,6 +49,15 @@ enum class PointReason : std::uint8_t {
 
 const char* to_string(PointReason reason) noexcept;
 
+// How a point's transient was dealt with.
+enum class SettledBy : std::uint8_t {
+  wait,       // waited for a fixed time
+  detection,  // seen to go
+  model,      // regressed along
+};
+
+const char* to_string(SettledBy way) noexcept;
+
 // The result of a dwell for one tone and one pair of channels.
 struct Point {
   std::uint32_t dwell = 0;
@@ -58,6 +67,7 @@ struct Point {
   std::uint16_t output = first_sensor_channel;
   PointStatus status = PointStatus::good;
   PointReason reason = PointReason::none;
+  SettledBy settled_by = SettledBy::detection;
   double reason_value = 0.0;
   double frequency_hz = 0.0;
   std::complex<double> response{};

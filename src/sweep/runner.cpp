@@ -87,7 +87,12 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
                    plan_.judgement,    plan_.rate_hz},
       observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
-      range_faults_(sensors.size()) {}
+      range_faults_(sensors.size()) {
+  if (settings_.modes) {
+    measurement_.know(settings_.modes->prior, settings_.modes->noise_variance,
+                      settings_.modes->noise_dof);
+  }
+}
 
 RunOutcome SweepRunner::run(RunControl& control) noexcept {
   {

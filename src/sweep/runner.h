@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,12 +27,20 @@ struct RunControl {
   std::atomic<std::uint64_t> tick{0};
 };
 
+// What is known of the plant before a sweep that models transients.
+struct KnownModes {
+  ModePrior prior{};
+  std::vector<double> noise_variance{};  // per response's output, its unit squared
+  double noise_dof = 0.0;
+};
+
 struct RunnerSettings {
   Pairs responses{};                     // empty: every sensor over what was applied
   std::vector<std::size_t> readbacks{};  // sensors that read the excitation back
   bool record_samples = false;
   double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
   double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
+  std::optional<KnownModes> modes{};
   double max_gap_s = 1.0;        // without a tick: the machine slept, nobody minded the actuator
 };
 
