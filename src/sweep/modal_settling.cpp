@@ -36,6 +36,13 @@ constexpr double forgetting = 1.05 * 1.05;
 
 constexpr double most_noise_dof = 20000.0;
 
+// Standard errors by which the scatter of a window and of those before has to exceed that of white
+// noise to be taken for coloured.
+constexpr double coloured_sigmas = 2.0;
+
+// … of which so many count for a window: noise is not stationary for ever.
+constexpr double most_pooled_dof = 200.0;
+
 double largest_eigenvalue(const Covariance2& c) noexcept {
   const double half = 0.5 * (c.re_re + c.im_im);
   const double apart = 0.5 * (c.re_re - c.im_im);
@@ -207,13 +214,12 @@ void ModalSettling::linearise_again(const ModalStore& store, std::size_t channel
   }
 }
 
-// s² of the window, not below what the noise has been by more than chance.
+// s² of the window, pooled with what the noise has been: a short window hardly knows.
 double ModalSettling::noise_of_window(std::size_t output,
                                       const ModalSolution& solution) const noexcept {
   const double dof = std::max(1.0, solution.samples - solution.unknowns);
-  const OutputNoise& known = noise_[output];
-  const double least = 1.0 - 2.0 * std::sqrt(2.0 / dof + 2.0 / std::max(1.0, known.dof));
-  return std::max(solution.residual_variance(), known.variance * std::max(0.0, least));
+  const double known = std::min(noise_[output].dof, most_pooled_dof);
+  return (dof * solution.residual_variance() + known * noise_[output].variance) / (dof + known);
 }
 
 // The applied tone over the window: it is a sine, without a transient.
@@ -305,6 +311,18 @@ bool ModalSettling::fill_result(const ModalStore& store, std::size_t output) noe
   }
   result.variance =
       memories_[output].pooled(estimate, task_.omega_rad_s / (2.0 * std::numbers::pi));
+  if (result.variance.dof == 0.0) {
+    result.variance = {.covariance = estimate.white,
+                       .dof = std::min(noise_[output].dof, most_pooled_dof)};
+  }
+  // The white variance is known much better; it stands where nothing speaks against it.
+  const double colour =
+      result.variance.covariance.mean_variance() / estimate.white.mean_variance();
+  if (colour < 1.0 + coloured_sigmas * std::sqrt(2.0 / result.variance.dof)) {
+    result.variance.covariance = estimate.white;
+    result.variance.dof = std::max(result.variance.dof, std::min(noise_[output].dof, most_pooled_dof));
+    result.variance.expected = 1.0;
+  }
   result.known = true;
   return true;
 }

@@ -22,6 +22,10 @@ constexpr double max_dwell_samples = 2.6e9;
 constexpr std::size_t finest_pieces = 64;
 constexpr std::size_t most_candidates = 20'000;
 
+// In cycles: a change of amplitude takes this long where the transient is modelled. Its slew is
+// held against the limits.
+constexpr double modelled_ramp = 1.0 / 16.0;
+
 // A candidate may follow any dwell: it always has the ramp of a change.
 const Dwell any_dwell{.tones = {{}, {}}};
 
@@ -115,8 +119,9 @@ Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Ton
            other.tones.front().amplitude == tones.front().amplitude;
   };
   const bool changes = before == nullptr ? tones.size() > 1 : !same_amplitude(*before);
-  const double ramp_samples =
-      std::ceil(std::max(sweep.ramp_s * rate_hz, changes ? samples_per_cycle / 2.0 : 0.0) - 1e-9);
+  const double least_ramp =
+      changes ? samples_per_cycle * (sweep.settling == Settling::model ? modelled_ramp : 0.5) : 0.0;
+  const double ramp_samples = std::ceil(std::max(sweep.ramp_s * rate_hz, least_ramp) - 1e-9);
   // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
   const double settle_unit = sweep.settling == Settling::fixed ? base_samples : 1.0;
   const double settle_samples =
