@@ -48,6 +48,14 @@ void Excitation::start(const Dwell& dwell, double scale) noexcept {
   if (several) handover_ = last - tones();
 }
 
+void Excitation::start(std::span<const double> waveform) noexcept {
+  waveform_ = waveform;
+  tones_ = 0;
+  bins_ = 0;
+  elapsed_ = 0;
+  loudness_ = 0.0;
+}
+
 void Excitation::advance(std::uint64_t ticks) noexcept {
   elapsed_ += ticks;
   run_ticks_ += ticks;
@@ -57,6 +65,7 @@ void Excitation::advance(std::uint64_t ticks) noexcept {
 }
 
 void Excitation::refresh() noexcept {
+  if (tones_ == 0) return;
   for (std::size_t i = 0; i < tones_; ++i) phasors_[i] = voices_[i].phase.phasor();
   const Phasor tone = phasors_[0];
   const std::size_t harmonics_end = bins_ - (baseline_.oscillates() ? 1 : 0);
@@ -73,6 +82,7 @@ void Excitation::refresh() noexcept {
 }
 
 double Excitation::tones() const noexcept {
+  if (tones_ == 0) return elapsed_ < waveform_.size() ? waveform_[elapsed_] : 0.0;
   double sum = 0.0;
   for (std::size_t i = 0; i < tones_; ++i) {
     sum += voices_[i].in_phase * phasors_[i].sine + voices_[i].quadrature * phasors_[i].cosine;

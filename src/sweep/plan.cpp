@@ -7,6 +7,7 @@
 
 #include "sweep/motion_check.h"
 #include "sweep/multitone.h"
+#include "sweep/probe.h"
 
 namespace sinerig {
 
@@ -274,13 +275,13 @@ Refinement make_refinement(const SweepPlan& plan, const SweepSettings& sweep,
 }  // namespace
 
 std::uint64_t SweepPlan::min_samples() const {
-  std::uint64_t sum = 0;
+  std::uint64_t sum = probe.command.size();
   for (const Dwell& dwell : dwells) sum += dwell.min_samples();
   return sum;
 }
 
 std::uint64_t SweepPlan::max_samples() const {
-  std::uint64_t sum = 0;
+  std::uint64_t sum = probe.command.size();
   for (const Dwell& dwell : dwells) sum += dwell.max_samples;
   return sum;
 }
@@ -323,6 +324,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
     check_ramp(dwell, before == nullptr ? 0.0 : before->tones.front().amplitude, limits, rate_hz);
     plan.dwells.push_back(std::move(dwell));
   }
+  plan.probe = make_probe(sweep, limits, rate_hz);
   if (sweep.refine_points > 0) plan.refinement = make_refinement(plan, sweep, limits);
   return plan;
 }

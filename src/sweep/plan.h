@@ -79,6 +79,7 @@ struct SweepSettings {
   double ramp_s = 0.0;
 
   Settling settling = Settling::detect;
+  double probe_s = -1.0;  // model: length of the first pass; negative: of its own, 0: none
   Span settle{.cycles = 0.0, .seconds = 0.0};           // waited for before anything is measured
   Span settle_max{.cycles = 20.0, .seconds = 20.0};     // detect: how long settling may take
   Span integrate{.cycles = 1.0, .seconds = 0.1};        // at least
@@ -126,7 +127,9 @@ struct Dwell {
   // all that min_samples() says.
   std::uint64_t least_samples = 0;
 
-  std::uint64_t min_samples() const { return settle_samples + blocks * block_samples; }
+  std::uint64_t min_samples() const {
+    return least_samples > 0 ? least_samples : settle_samples + blocks * block_samples;
+  }
   double tone_hz(const Tone& tone, double rate_hz) const {
     return rate_hz * static_cast<double>(tone.cycles) / static_cast<double>(block_samples);
   }
@@ -164,10 +167,18 @@ struct Refinement {
   double tolerance_db = 0.5;
 };
 
+// What is played before the first dwell, on the baseline; see make_probe.
+struct Probe {
+  std::vector<double> command;  // per tick
+  double low_hz = 0.0;
+  double high_hz = 0.0;
+};
+
 struct SweepPlan {
   double rate_hz = 0.0;
   Baseline baseline{};
   Level level{};
+  Probe probe{};
   std::vector<Dwell> dwells;
   Refinement refinement{};
   Judgement judgement{};

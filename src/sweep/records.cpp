@@ -44,6 +44,7 @@ const char* to_string(PointReason reason) noexcept {
 const char* to_string(EventKind kind) noexcept {
   switch (kind) {
     case EventKind::started: return "started";
+    case EventKind::probed: return "probed";
     case EventKind::dwell_began: return "dwell_began";
     case EventKind::retried: return "retried";
     case EventKind::refined: return "refined";

@@ -112,6 +112,7 @@ struct DwellTiming {
 
 enum class EventKind : std::uint8_t {
   started,
+  probed,  // the first pass has ended; value: modes found
   dwell_began,
   retried,         // value: amplitude of the next try
   refined,         // a dwell was added; value: disagreement that called for it, dB; candidate

@@ -55,6 +55,12 @@ Pairs responses_of(const RunnerSettings& settings, std::size_t sensors) {
   return pairs;
 }
 
+std::vector<std::size_t> outputs_of(const Pairs& pairs) {
+  std::vector<std::size_t> outputs;
+  for (const Pair& pair : pairs) outputs.push_back(pair.output);
+  return outputs;
+}
+
 class ReleaseOnExit {
  public:
   explicit ReleaseOnExit(Actuator& actuator) : actuator_{actuator} {}
@@ -85,6 +91,9 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       measurement_{1 + sensors.size(), most_bins(plan_),
                    most_tones(plan_),  responses_of(settings_, sensors.size()),
                    plan_.judgement,    plan_.rate_hz},
+      prober_{plan_.probe, outputs_of(measurement_.pairs()), plan_.rate_hz,
+              settings_.modes ? nullptr : settings_.finder,
+              settings_.real_time ? Deputy::Where::own_thread : Deputy::Where::at_once},
       observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
       range_faults_(sensors.size()) {
@@ -119,10 +128,12 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const std::uint64_t ticks = first ? 1 : tick.index - last_tick_;
 
   const bool closing = dwell_ == dwells_.size();
-  const bool new_dwell = !closing && dwell_ticks_ == 0;
+  const bool probing = prober_.running();
+  const bool new_dwell = !closing && !probing && dwell_ticks_ == 0;
   if (new_dwell) begin_dwell(first ? 0 : last_tick_ + 1);
-  excitation_.advance(new_dwell ? ticks - 1 : ticks);
-  dwell_ticks_ += ticks;
+  if (probing && first) excitation_.start(plan_.probe.command);
+  excitation_.advance(new_dwell || (probing && first) ? ticks - 1 : ticks);
+  if (!probing) dwell_ticks_ += ticks;
   account(tick, ticks);
 
   const int stop_requests = control.stop_requests.load(std::memory_order_relaxed);
@@ -140,7 +151,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
 
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
-    if (!closing) {
+    if (!closing && !probing) {
       measurement_.conclude();
       finish_dwell();
     }
@@ -149,7 +160,12 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
-  measure(tick.index, ticks > 1 || late || command_lost_ || command_late_);
+  const bool disturbed = ticks > 1 || late || command_lost_ || command_late_;
+  if (probing) {
+    probe(disturbed);
+  } else {
+    measure(tick.index, disturbed);
+  }
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
   if (dwell_ < dwells_.size()) return true;
   excitation_.close();
@@ -216,6 +232,18 @@ void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
               .tick = tick});
   }
   sensor_faults_[sensor] = sample.fault;
+}
+
+// The first pass, in which the modes are found.
+void SweepRunner::probe(bool disturbed) noexcept {
+  prober_.add(observations_, disturbed);
+  if (prober_.restarted()) excitation_.start(plan_.probe.command);
+  if (prober_.running()) return;
+  const KnownModes* found = prober_.found();
+  if (found != nullptr) measurement_.know(found->prior, found->noise_variance, found->noise_dof);
+  announce({.kind = EventKind::probed,
+            .tick = last_tick_,
+            .value = found != nullptr ? static_cast<double>(found->prior.modes) : 0.0});
 }
 
 // A late or lost command has disturbed the plant: what was gathered is void, wait again. A lost

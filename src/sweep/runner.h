@@ -14,7 +14,9 @@
 #include "sweep/guard.h"
 #include "sweep/leveller.h"
 #include "sweep/measurement.h"
+#include "sweep/known_modes.h"
 #include "sweep/plan.h"
+#include "sweep/probe.h"
 #include "sweep/records.h"
 #include "sweep/refiner.h"
 
@@ -27,20 +29,15 @@ struct RunControl {
   std::atomic<std::uint64_t> tick{0};
 };
 
-// What is known of the plant before a sweep that models transients.
-struct KnownModes {
-  ModePrior prior{};
-  std::vector<double> noise_variance{};  // per response's output, its unit squared
-  double noise_dof = 0.0;
-};
-
 struct RunnerSettings {
   Pairs responses{};                     // empty: every sensor over what was applied
   std::vector<std::size_t> readbacks{};  // sensors that read the excitation back
   bool record_samples = false;
   double min_excitation = 1e-3;  // |U| of a tone below this part of its amplitude is no excitation
   double max_lateness = 0.5;     // of a period: a command later than this disturbs the plant
-  std::optional<KnownModes> modes{};
+  std::optional<KnownModes> modes{};  // for settling by a model; without, the finder is asked
+  ModeFinder* finder = nullptr;       // must outlive the runner
+  bool real_time = false;             // what takes long is done on other threads
   double max_gap_s = 1.0;        // without a tick: the machine slept, nobody minded the actuator
 };
 
@@ -66,6 +63,7 @@ class SweepRunner {
   bool step(RunControl& control) noexcept SINERIG_NONBLOCKING;
   void exchange(double command, const Tick& tick) noexcept SINERIG_NONBLOCKING;
   bool applied_late(std::int64_t offset_ns) noexcept SINERIG_NONBLOCKING;
+  void probe(bool disturbed) noexcept SINERIG_NONBLOCKING;
   void measure(std::uint64_t tick, bool disturbed) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
   void put_block(std::uint64_t tick) noexcept;
@@ -91,6 +89,7 @@ class SweepRunner {
   Excitation excitation_;
   Leveller leveller_;
   Measurement measurement_;
+  Prober prober_;
   std::vector<Observation> observations_;    // applied, sensors: this tick
   double command_ = 0.0;                     // this tick
   std::vector<Fault> sensor_faults_;         // of the last tick

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include "quality_plants.h"
 #include "support/virtual_run.h"
+#include "cli/found_modes.h"
 using namespace sinerig;
 using namespace sinerig::quality;
 int main(int argc,char**argv){
@@ -34,14 +35,14 @@ int main(int argc,char**argv){
           known.prior.poles[known.prior.modes++]=pole;
         }
         known.noise_variance={of.noise_rms*of.noise_rms}; known.noise_dof=500;
-        RunnerSettings rs; rs.modes=known;
+        RunnerSettings rs; cli::IdentifiedModes finder; if(wrong>=0) rs.modes=known; else rs.finder=&finder;
         const test::VirtualRun run=test::run_virtual(of.plan,of.rig(static_cast<unsigned long>(seed)),test::open_guard(1),rs);
         bool in=true;
         for(const Point&p:run.sink.points){ ResponseError e=error_of(p.response,of.plant.response(p.frequency_hz));
           seconds+=p.seconds; in=in&&within_bounds(e); worst=std::max(worst,e.gain_db); cov+=(e.gain_db<=p.gain_interval_db)+(e.phase_deg<=p.phase_interval_deg); pts++; notgood+=p.status!=PointStatus::good; detected+=p.settled_by!=SettledBy::model;
           if(getenv("V")) printf("%8.3f Hz %6.2f s err %.4f dB %.3f deg ci %.4f %.3f snr %.0f %s %s %s\n",p.frequency_hz,p.seconds,e.gain_db,e.phase_deg,p.gain_interval_db,p.phase_interval_deg,p.snr_db,to_string(p.status),to_string(p.reason),to_string(p.settled_by));
         }
-        ok+=in;
+        ok+=in; if(wrong<0) seconds+=double(of.plan.probe.command.size())/1000; 
       }
       double t=1; for(auto&x:timed) if(x.first==key) t=x.second;
       printf("%s %8.1f s  %.3f  ok %5.1f%%  worst %.3f dB covers %.1f%% notgood %.2f detected %.2f\n",key.c_str(),seconds/seeds,seconds/seeds/t,100.0*ok/seeds,worst,50.0*cov/pts,double(notgood)/seeds,double(detected)/seeds);

@@ -1,0 +1,89 @@
+#include "cli/found_modes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+
+#include <Eigen/Core>
+
+#include "identify/transient_modes.h"
+
+namespace sinerig::cli {
+
+namespace {
+
+// The record says less of the poles than its linearised covariance: this much of them is doubted
+// beside it.
+constexpr double least_doubt = 1e-6;
+
+// A pole that is known to be zero no better than this is the constant of the regression, to which
+// it looks alike.
+constexpr double looks_like_rest_rad_s = 1e-3;
+
+// A transient that is gone by this part within the blind ticks is not seen in a dwell.
+constexpr double gone = 1e-5;
+
+constexpr int most_delay_ticks = 4;
+
+std::size_t size_of(std::complex<double> pole) {
+  return pole.imag() == 0.0 ? 1 : 2;
+}
+
+// The poles that a dwell can see, those that ring longest first where there are too many.
+ModePrior prior_of(const identify::FoundModes& modes, double period_s) {
+  ModePrior prior;
+  prior.blind_ticks = most_delay_ticks + 1;
+  std::vector<std::size_t> rows;  // of the covariance
+  std::size_t row = 0;
+  for (const std::complex<double>& pole : modes.poles) {
+    const std::size_t size = size_of(pole);
+    const double seen = std::exp(pole.real() * period_s * prior.blind_ticks);
+    const bool rests = pole.imag() == 0.0 && std::abs(pole.real()) < looks_like_rest_rad_s;
+    if (prior.modes < ModePrior::max_modes && seen > gone && !rests) {
+      prior.poles[prior.modes++] = {.sigma_rad_s = pole.real(), .omega_rad_s = pole.imag()};
+      for (std::size_t k = 0; k < size; ++k) rows.push_back(row + k);
+    }
+    row += size;
+  }
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      prior.covariance[triangle(i) + j] = modes.covariance(
+          static_cast<Eigen::Index>(rows[i]), static_cast<Eigen::Index>(rows[j]));
+    }
+  }
+  std::size_t index = 0;
+  for (const ModePole& pole : prior.known()) {
+    for (std::size_t k = 0; k < pole.size(); ++k, ++index) {
+      const double size = std::hypot(pole.sigma_rad_s, pole.omega_rad_s);
+      prior.covariance[triangle(index) + index] += least_doubt * least_doubt * size * size;
+    }
+  }
+  return prior;
+}
+
+}  // namespace
+
+bool IdentifiedModes::find(const ProbeRecord& record, KnownModes& found) noexcept {
+  try {
+    found = {};
+    identify::ModeSettings settings{.most_delay_ticks = most_delay_ticks,
+                                    .lowest_hz = record.low_hz,
+                                    .highest_hz = std::min(2.0 * record.high_hz, 0.4 / record.period_s)};
+    identify::MotionRecord motion{.period_s = record.period_s,
+                                  .input = {record.applied.begin(), record.applied.end()},
+                                  .output = {}};
+    for (std::size_t i = 0; i < record.outputs.size(); ++i) {
+      motion.output.assign(record.outputs[i].begin(), record.outputs[i].end());
+      const identify::FoundModes modes = identify::find_modes(motion, settings);
+      found.noise_variance.push_back(modes.noise_variance);
+      if (i > 0) continue;
+      found.noise_dof = modes.degrees_of_freedom;
+      found.prior = prior_of(modes, record.period_s);
+    }
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
+}
+
+}  // namespace sinerig::cli
