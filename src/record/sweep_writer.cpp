@@ -62,9 +62,9 @@ std::string histogram_text(const DwellTiming& timing) {
 struct SweepWriter::Statements {
   explicit Statements(Database& database)
       : run{database, "INSERT OR REPLACE INTO run VALUES (?, ?)"},
-        point{database, "INSERT INTO point VALUES (" + placeholders(25) + ")"},
+        point{database, "INSERT OR REPLACE INTO point VALUES (" + placeholders(25) + ")"},
         block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"},
-        timing{database, "INSERT INTO timing VALUES (?, ?, ?, ?, ?, ?, ?)"},
+        timing{database, "INSERT OR REPLACE INTO timing VALUES (?, ?, ?, ?, ?, ?, ?)"},
         event{database, "INSERT INTO event VALUES (NULL, ?, ?, ?, nullif(?, 0), ?, ?, ?)"},
         sample{database, "INSERT INTO sample VALUES (?, ?, ?)"} {}
 
@@ -181,6 +181,10 @@ void SweepWriter::insert(const DwellTiming& timing) {
 }
 
 void SweepWriter::insert(const Event& event) {
+  if (event.kind == EventKind::remeasured) {
+    // What follows stands in place of what was.
+    Statement{database_, "DELETE FROM block WHERE dwell = ?"}.bind(event.dwell).run();
+  }
   if (event.kind == EventKind::refined) write_dwell(event.dwell, candidates_.at(event.candidate));
   const std::string detail =
       event.kind == EventKind::tripped ? describe(event.trip, sensor_names_) : "";

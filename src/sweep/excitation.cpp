@@ -48,7 +48,9 @@ void Excitation::start(const Dwell& dwell, double scale) noexcept {
   if (several) handover_ = last - tones();
 }
 
-void Excitation::start(std::span<const double> waveform) noexcept {
+void Excitation::start(std::span<const double> waveform, std::uint64_t ramp_samples) noexcept {
+  handover_ = tones();
+  ramp_samples_ = ramp_samples;
   waveform_ = waveform;
   tones_ = 0;
   bins_ = 0;
@@ -82,7 +84,12 @@ void Excitation::refresh() noexcept {
 }
 
 double Excitation::tones() const noexcept {
-  if (tones_ == 0) return elapsed_ < waveform_.size() ? waveform_[elapsed_] : 0.0;
+  if (tones_ == 0) {
+    const double value = elapsed_ < waveform_.size() ? waveform_[elapsed_] : 0.0;
+    if (elapsed_ >= ramp_samples_) return value;
+    return value + handover_ * (1.0 - static_cast<double>(elapsed_) /
+                                          static_cast<double>(ramp_samples_));
+  }
   double sum = 0.0;
   for (std::size_t i = 0; i < tones_; ++i) {
     sum += voices_[i].in_phase * phasors_[i].sine + voices_[i].quadrature * phasors_[i].cosine;

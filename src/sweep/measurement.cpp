@@ -129,6 +129,7 @@ void Measurement::restart() noexcept {
 
 void Measurement::start_modal() noexcept {
   by_model_ = false;
+  refuted_ = false;
   modal_live_ = modal_ && modal_->knows() && dwell_->tones.size() == 1 && dwell_->bias_hz == 0.0;
   if (!modal_live_) return;
   store_->clear();
@@ -152,7 +153,10 @@ void Measurement::add_modal(Phasor tone, std::span<const Observation> observatio
   const ModalVerdict verdict = modal_->look(*store_, store_->count());
   if (verdict == ModalVerdict::going_on) return;
   modal_live_ = false;
-  if (verdict == ModalVerdict::abandoned) return;
+  if (verdict == ModalVerdict::abandoned) {
+    refuted_ = modal_->doubt() == ModalDoubt::residual;
+    return;
+  }
   modal_->learn();
   take_modal();
   done_ = true;

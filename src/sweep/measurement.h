@@ -63,6 +63,17 @@ class Measurement {
   Point point(std::size_t pair, std::size_t tone) const noexcept SINERIG_NONBLOCKING;
   const Pairs& pairs() const noexcept { return pairs_; }
 
+  // Of the dwell that has ended: the model of its transient ended it, or was abandoned because it
+  // left more than the noise.
+  bool modelled() const noexcept { return by_model_; }
+  bool model_refuted() const noexcept { return refuted_; }
+  const ModePrior& modes() const noexcept { return modal_->prior(); }
+  bool models() const noexcept { return modal_ && modal_->knows(); }
+  // From here on transients are waited for.
+  void stop_modelling() noexcept SINERIG_NONBLOCKING {
+    if (modal_) modal_->forget();
+  }
+
  private:
   struct Result {
     Estimate estimate{};
@@ -111,6 +122,7 @@ class Measurement {
   std::unique_ptr<ModalStore> store_;
   bool modal_live_ = false;    // this dwell is still the model's
   bool by_model_ = false;      // … and it ended it
+  bool refuted_ = false;       // … and it left more than the noise
   std::uint64_t blind_left_ = 0;
 
   const Dwell* dwell_ = nullptr;

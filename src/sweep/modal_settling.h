@@ -53,7 +53,8 @@ class ModalSettling {
   // What is known before the first dwell. `noise_variance` per output, known to `noise_dof`.
   void know(const ModePrior& prior, std::span<const double> noise_variance,
             double noise_dof) noexcept;
-  bool knows() const noexcept { return prior_.modes > 0 || known_; }
+  bool knows() const noexcept { return known_; }
+  void forget() noexcept { known_ = false; }
   const ModePrior& prior() const noexcept { return prior_; }
 
   void start(const ModalTask& task) noexcept;

@@ -169,7 +169,8 @@ struct Refinement {
 
 // What is played before the first dwell, on the baseline; see make_probe.
 struct Probe {
-  std::vector<double> command;  // per tick
+  std::vector<double> command;      // per tick
+  std::uint64_t quiet_samples = 0;  // of them at rest before the waveform begins
   double low_hz = 0.0;
   double high_hz = 0.0;
 };

@@ -28,12 +28,13 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   if (sweep.settling != Settling::model || sweep.probe_s == 0.0) return {};
   const std::vector<double> asked = asked_frequencies(sweep);
   const auto [low, high] = std::minmax_element(asked.begin(), asked.end());
-  Probe probe{.command = {}, .low_hz = *low, .high_hz = *high};
+  Probe probe{.command = {}, .quiet_samples = 0, .low_hz = *low, .high_hz = *high};
   const double wanted = sweep.probe_s > 0.0 ? sweep.probe_s * rate_hz
                                             : cycles_of_lowest / probe.low_hz * rate_hz;
   const double ticks = std::clamp(wanted, least_ticks, most_ticks);
   const auto quiet = static_cast<std::size_t>(quiet_part * ticks);
   const auto length = static_cast<std::size_t>(ticks);
+  probe.quiet_samples = quiet;
   probe.command.assign(length, 0.0);
   const double octaves = std::log(std::max(probe.high_hz / probe.low_hz, 2.0));
   double phase = 0.0;
@@ -60,15 +61,16 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
 }
 
 Prober::Prober(const Probe& probe, const std::vector<std::size_t>& outputs, double rate_hz,
-               ModeFinder* finder, Deputy::Where where)
+               ModeFinder* finder, bool at_start, Deputy::Where where)
     : probe_{probe},
       period_s_{1.0 / rate_hz},
       outputs_{outputs},
       finder_{finder},
-      stage_{finder != nullptr && !probe.command.empty() ? Stage::playing : Stage::done},
+      stage_{at_start && finder != nullptr && !probe.command.empty() ? Stage::playing
+                                                                     : Stage::done},
       applied_(probe.command.size()),
       values_(outputs.size() * probe.command.size()),
-      deputy_{[this] { search(); }, stage_ == Stage::done ? Deputy::Where::at_once : where} {
+      deputy_{[this] { search(); }, finder == nullptr ? Deputy::Where::at_once : where} {
   record_ = {.period_s = period_s_,
              .low_hz = probe.low_hz,
              .high_hz = probe.high_hz,
@@ -77,6 +79,15 @@ Prober::Prober(const Probe& probe, const std::vector<std::size_t>& outputs, doub
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     record_.outputs.push_back({&values_[i * applied_.size()], applied_.size()});
   }
+}
+
+void Prober::again() noexcept {
+  known_ = false;
+  if (finder_ == nullptr || probe_.command.empty()) return;
+  stage_ = Stage::playing;
+  begins_ = true;
+  count_ = 0;
+  attempts_ = 0;
 }
 
 void Prober::search() noexcept {
@@ -90,7 +101,7 @@ void Prober::add(std::span<const Observation> observations, bool disturbed) noex
   }
   if (disturbed) {
     count_ = 0;
-    restart_ = true;
+    begins_ = true;
     if (++attempts_ == most_attempts) stage_ = Stage::done;
     return;
   }

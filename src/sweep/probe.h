@@ -24,19 +24,25 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
 // they are found.
 class Prober {
  public:
-  // `outputs`: channels of the regression, one per response. Without a finder, or a waveform, it has nothing to do.
+  // `outputs`: channels of the regression, one per response. Without a finder, or a waveform, it has
+  // nothing to do; nor has it at the start of a sweep that knows its modes.
   Prober(const Probe& probe, const std::vector<std::size_t>& outputs, double rate_hz,
-         ModeFinder* finder, Deputy::Where where);
+         ModeFinder* finder, bool at_start, Deputy::Where where);
 
   // The dwells have to wait.
   bool running() const noexcept { return stage_ != Stage::done; }
 
   // One tick. A disturbance (the command was late or lost) voids the record: it is made once more,
-  // a few times; restarted() tells.
+  // a few times.
   void add(std::span<const Observation> observations, bool disturbed) noexcept SINERIG_NONBLOCKING;
-  bool restarted() noexcept { return std::exchange(restart_, false); }
 
-  // After it has run: nothing where it had nothing to do or nothing was found.
+  // The waveform begins with this tick.
+  bool begins() noexcept { return std::exchange(begins_, false); }
+
+  // The modes have to be found once more.
+  void again() noexcept SINERIG_NONBLOCKING;
+
+  // After it has run: nothing where it had nothing to do, or nothing was found.
   const KnownModes* found() const noexcept { return known_ ? &found_ : nullptr; }
 
  private:
@@ -51,7 +57,7 @@ class Prober {
   Stage stage_;
   std::size_t count_ = 0;
   int attempts_ = 0;
-  bool restart_ = false;
+  bool begins_ = true;
   std::vector<double> applied_;
   std::vector<double> values_;  // per output, one after the other
   ProbeRecord record_;

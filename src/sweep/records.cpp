@@ -45,6 +45,8 @@ const char* to_string(EventKind kind) noexcept {
   switch (kind) {
     case EventKind::started: return "started";
     case EventKind::probed: return "probed";
+    case EventKind::model_doubted: return "model_doubted";
+    case EventKind::remeasured: return "remeasured";
     case EventKind::dwell_began: return "dwell_began";
     case EventKind::retried: return "retried";
     case EventKind::refined: return "refined";

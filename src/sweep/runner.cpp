@@ -92,8 +92,9 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
                    most_tones(plan_),  responses_of(settings_, sensors.size()),
                    plan_.judgement,    plan_.rate_hz},
       prober_{plan_.probe, outputs_of(measurement_.pairs()), plan_.rate_hz,
-              settings_.modes ? nullptr : settings_.finder,
+              settings_.finder, !settings_.modes,
               settings_.real_time ? Deputy::Where::own_thread : Deputy::Where::at_once},
+      trust_{dwells_.capacity()},
       observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
       range_faults_(sensors.size()) {
@@ -131,8 +132,9 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool probing = prober_.running();
   const bool new_dwell = !closing && !probing && dwell_ticks_ == 0;
   if (new_dwell) begin_dwell(first ? 0 : last_tick_ + 1);
-  if (probing && first) excitation_.start(plan_.probe.command);
-  excitation_.advance(new_dwell || (probing && first) ? ticks - 1 : ticks);
+  const bool probe_begins = probing && prober_.begins();
+  if (probe_begins) excitation_.start(plan_.probe.command, plan_.probe.quiet_samples / 2);
+  excitation_.advance(new_dwell || probe_begins ? ticks - 1 : ticks);
   if (!probing) dwell_ticks_ += ticks;
   account(tick, ticks);
 
@@ -237,13 +239,30 @@ void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
 // The first pass, in which the modes are found.
 void SweepRunner::probe(bool disturbed) noexcept {
   prober_.add(observations_, disturbed);
-  if (prober_.restarted()) excitation_.start(plan_.probe.command);
   if (prober_.running()) return;
+  judge_model();
+}
+
+// What the probe found is used from here on.
+void SweepRunner::judge_model() noexcept {
   const KnownModes* found = prober_.found();
-  if (found != nullptr) measurement_.know(found->prior, found->noise_variance, found->noise_dof);
+  const bool doubted = trust_.doubted();
+  bool use = found != nullptr;
+  if (doubted) {
+    const ModelTrust::Judgement judgement = trust_.probed(found, measurement_.modes());
+    announce({.kind = EventKind::model_doubted,
+              .dwell = dwell_,
+              .tick = last_tick_,
+              .value = static_cast<double>(judgement)});
+    if (judgement == ModelTrust::Judgement::given_up) measurement_.stop_modelling();
+    use = judgement == ModelTrust::Judgement::replaced;
+  }
+  if (use) measurement_.know(found->prior, found->noise_variance, found->noise_dof);
   announce({.kind = EventKind::probed,
+            .dwell = dwell_,
             .tick = last_tick_,
             .value = found != nullptr ? static_cast<double>(found->prior.modes) : 0.0});
+  if (doubted) next_dwell();
 }
 
 // A late or lost command has disturbed the plant: what was gathered is void, wait again. A lost
@@ -269,9 +288,29 @@ void SweepRunner::measure(std::uint64_t tick, bool disturbed) noexcept {
   if (try_again()) return;
   finish_dwell();
   attempt_ = 0;
-  ++dwell_;
   ++outcome_.dwells_done;
-  if (dwell_ == dwells_.size()) refine();
+  trust_.dwell_ended(dwell_, measurement_.modelled(), measurement_.model_refuted());
+  if (!trust_.doubted()) {
+    next_dwell();
+    return;
+  }
+  prober_.again();
+  if (!prober_.running()) judge_model();  // nobody can find them
+}
+
+// The plan, then what refinement adds, then what has to be measured again because the modes that
+// its transients were modelled with turned out wrong.
+void SweepRunner::next_dwell() noexcept {
+  if (!remeasuring_) {
+    ++dwell_;
+    if (dwell_ == dwells_.size()) refine();
+    remeasuring_ = dwell_ == dwells_.size();
+  }
+  if (!remeasuring_) return;
+  dwell_ = std::min(trust_.next_condemned(0), static_cast<std::uint32_t>(dwells_.size()));
+  if (dwell_ == dwells_.size()) return;
+  trust_.acquit(dwell_);
+  announce({.kind = EventKind::remeasured, .dwell = dwell_, .tick = last_tick_});
 }
 
 // One more dwell where the response between two points is not known.

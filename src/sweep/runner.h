@@ -15,6 +15,7 @@
 #include "sweep/leveller.h"
 #include "sweep/measurement.h"
 #include "sweep/known_modes.h"
+#include "sweep/model_trust.h"
 #include "sweep/plan.h"
 #include "sweep/probe.h"
 #include "sweep/records.h"
@@ -68,6 +69,8 @@ class SweepRunner {
   void begin_dwell(std::uint64_t tick) noexcept;
   void put_block(std::uint64_t tick) noexcept;
   void check_excitation(std::uint64_t tick) noexcept;
+  void judge_model() noexcept;
+  void next_dwell() noexcept;
   bool try_again() noexcept;
   void finish_dwell() noexcept;
   void refine() noexcept;
@@ -90,6 +93,8 @@ class SweepRunner {
   Leveller leveller_;
   Measurement measurement_;
   Prober prober_;
+  ModelTrust trust_;
+  bool remeasuring_ = false;
   std::vector<Observation> observations_;    // applied, sensors: this tick
   double command_ = 0.0;                     // this tick
   std::vector<Fault> sensor_faults_;         // of the last tick
