@@ -6,7 +6,9 @@
 
 #include <Eigen/Core>
 
+#include "cli/plant_model.h"
 #include "identify/transient_modes.h"
+#include "record/sweep_reader.h"
 
 namespace sinerig::cli {
 
@@ -24,6 +26,13 @@ constexpr double looks_like_rest_rad_s = 1e-3;
 constexpr double gone = 1e-5;
 
 constexpr int most_delay_ticks = 4;
+
+// What a night does to a mode beside what the fit did not know: parts of its frequency and decay.
+constexpr double moved_frequency = 0.01;
+constexpr double moved_decay = 0.2;
+
+// The noise of another night is known as if from so few samples.
+constexpr double other_night_dof = 10.0;
 
 std::size_t size_of(std::complex<double> pole) {
   return pole.imag() == 0.0 ? 1 : 2;
@@ -61,7 +70,58 @@ ModePrior prior_of(const identify::FoundModes& modes, double period_s) {
   return prior;
 }
 
+// Median over the good points of the variance that the tone leaves.
+double noise_variance(const record::StoredResponse& response) {
+  std::vector<double> variances;
+  for (const record::StoredPoint& point : response.points) {
+    if (point.status != "good") continue;
+    const double power = 0.5 * point.output_amplitude * point.output_amplitude;
+    variances.push_back(power * std::pow(10.0, -point.snr_db / 10.0));
+  }
+  if (variances.empty()) return 0.0;
+  const auto middle = variances.begin() + static_cast<std::ptrdiff_t>(variances.size() / 2);
+  std::nth_element(variances.begin(), middle, variances.end());
+  return *middle;
+}
+
 }  // namespace
+
+KnownModes modes_of_file(const std::string& path, const std::vector<std::string>& outputs) {
+  const PlantModel model = read_plant_model(path, outputs.front(), false);
+  KnownModes known;
+  known.noise_dof = other_night_dof;
+  known.prior.blind_ticks = most_delay_ticks + 1;
+  std::size_t index = 0;
+  for (const identify::Mode& mode : model.modes) {
+    if (known.prior.modes == ModePrior::max_modes || !(mode.pole.real() < 0.0)) continue;
+    known.prior.poles[known.prior.modes++] = {.sigma_rad_s = mode.pole.real(),
+                                              .omega_rad_s = mode.pole.imag()};
+    const double natural = std::abs(mode.pole);
+    const double decay = std::hypot(moved_decay * mode.pole.real(),
+                                    natural * mode.damping.standard_error);
+    const double turn = natural * std::hypot(moved_frequency,
+                                             mode.frequency_hz.standard_error /
+                                                 mode.frequency_hz.value);
+    const bool real = mode.pole.imag() == 0.0;
+    known.prior.covariance[triangle(index) + index] =
+        real ? std::max(decay, turn) * std::max(decay, turn) : decay * decay;
+    if (!real) known.prior.covariance[triangle(index + 1) + index + 1] = turn * turn;
+    index += real ? 1 : 2;
+  }
+  const record::StoredRun run = record::read_sweep(path);
+  for (const std::string& name : outputs) {
+    double variance = 0.0;
+    for (const record::StoredResponse& response : run.responses) {
+      if (run.channels.at(response.output).name == name) variance = noise_variance(response);
+    }
+    if (!(variance > 0.0)) {
+      throw InputError(path + ": holds no good point of \"" + name +
+                       "\", so its noise is not known; take another prior, or none");
+    }
+    known.noise_variance.push_back(variance);
+  }
+  return known;
+}
 
 bool IdentifiedModes::find(const ProbeRecord& record, KnownModes& found) noexcept {
   try {

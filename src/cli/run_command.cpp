@@ -7,6 +7,7 @@
 
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
+#include "cli/found_modes.h"
 #include "cli/live_view.h"
 #include "cli/report_file.h"
 #include "cli/run_teller.h"
@@ -140,6 +141,15 @@ std::string reason_of(const RunOutcome& outcome, const ConfiguredRig& configured
   return reason;
 }
 
+std::optional<KnownModes> earlier_modes(const config::Rig& rig) {
+  if (rig.prior.empty()) return std::nullopt;
+  std::vector<std::string> outputs;
+  for (const Pair& pair : rig.runner.responses) {
+    outputs.push_back(rig.sensors.at(pair.output - 1).name);
+  }
+  return modes_of_file(rig.prior, outputs);
+}
+
 }  // namespace
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers) {
@@ -147,6 +157,7 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
   const config::Rig& rig = configured.rig();
   const SweepPlan plan = rig.plan();
   Clock& clock = configured.clock();
+  const std::optional<KnownModes> modes = earlier_modes(rig);
   RunControl control;
   const StopOnSignal stop_on_signal{control};
   const std::string path =
@@ -172,6 +183,10 @@ int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers
     throw;
   }
   RunnerSettings settings = rig.runner;
+  IdentifiedModes finder;
+  settings.finder = &finder;
+  settings.real_time = in_real_time;
+  settings.modes = modes;
   if (view) settings.record_samples = true;
   SweepRunner runner{
       plan,  settings, view ? view->clock() : clock, configured.actuator(), configured.sensors(),

@@ -33,6 +33,7 @@ struct Rig {
   Channel actuator;
   std::vector<Channel> sensors{};
   RunnerSettings runner{};
+  std::string prior{};  // sweep file that the plant's modes are taken from; empty: they are found
 
   // The plan of this rig; PlanRefused becomes a ConfigError with file and line.
   SweepPlan plan() const;

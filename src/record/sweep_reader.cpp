@@ -28,11 +28,15 @@ void check_identity(Database& database, const std::string& path) {
   }
 }
 
+// Some came after the first files of this version.
+bool has_column(Database& database, const std::string& table, const std::string& name) {
+  Statement column{database, "SELECT 1 FROM pragma_table_info(?) WHERE name = ?"};
+  return column.bind(table, name).step();
+}
+
 SweepPlan read_plan(Database& database, double rate_hz) {
   SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
-  // The column came after the first files of this version.
-  Statement column{database, "SELECT 1 FROM pragma_table_info('dwell') WHERE name = 'sub_band'"};
-  const std::string sub_band = column.step() ? "sub_band" : "0";
+  const std::string sub_band = has_column(database, "dwell", "sub_band") ? "sub_band" : "0";
   Statement dwells{database,
                    "SELECT asked_hz, block_samples, ramp_samples, settle_samples, blocks, "
                    "max_samples, " +
@@ -60,12 +64,14 @@ SweepPlan read_plan(Database& database, double rate_hz) {
 
 std::vector<StoredResponse> read_responses(Database& database) {
   std::vector<StoredResponse> responses;
+  const bool knows_settling = has_column(database, "point", "settled_by");
   Statement rows{
       database,
       "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, dof, "
       "gain_interval_db, phase_interval_deg, input_amplitude, output_amplitude, snr_db, "
-      "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value "
-      "FROM point ORDER BY response, freq_hz, dwell"};
+      "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value" +
+          std::string{knows_settling ? ", settled_by " : " "} +
+          "FROM point ORDER BY response, freq_hz, dwell"};
   while (rows.step()) {
     StoredPoint point{.dwell = whole<std::uint32_t>(rows, 0),
                       .tone = whole<std::uint32_t>(rows, 1),
@@ -88,6 +94,7 @@ std::vector<StoredResponse> read_responses(Database& database) {
                       .status = rows.text(21),
                       .reason = rows.text(22),
                       .reason_value = rows.number(23),
+                      .settled_by = knows_settling ? rows.text(24) : "",
                       .more = {}};
     const bool same_pair = !responses.empty() && responses.back().input == point.input &&
                            responses.back().output == point.output;

@@ -62,7 +62,7 @@ std::string histogram_text(const DwellTiming& timing) {
 struct SweepWriter::Statements {
   explicit Statements(Database& database)
       : run{database, "INSERT OR REPLACE INTO run VALUES (?, ?)"},
-        point{database, "INSERT OR REPLACE INTO point VALUES (" + placeholders(25) + ")"},
+        point{database, "INSERT OR REPLACE INTO point VALUES (" + placeholders(26) + ")"},
         block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"},
         timing{database, "INSERT OR REPLACE INTO timing VALUES (?, ?, ?, ?, ?, ?, ?)"},
         event{database, "INSERT INTO event VALUES (NULL, ?, ?, ?, nullif(?, 0), ?, ?, ?)"},
@@ -162,7 +162,8 @@ void SweepWriter::insert(const Point& point) {
             point.covariance.re_im, point.covariance.im_im, point.dof, point.gain_interval_db,
             point.phase_interval_deg, point.input_amplitude, point.output_amplitude, point.snr_db,
             point.distortion, point.drift_per_s, point.samples, point.lost, point.seconds,
-            to_string(point.status), to_string(point.reason), point.reason_value)
+            to_string(point.status), to_string(point.reason), point.reason_value,
+            to_string(point.settled_by))
       .run();
 }
 

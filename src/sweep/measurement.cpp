@@ -157,7 +157,6 @@ void Measurement::add_modal(Phasor tone, std::span<const Observation> observatio
     refuted_ = modal_->doubt() == ModalDoubt::residual;
     return;
   }
-  modal_->learn();
   take_modal();
   done_ = true;
 }

@@ -26,6 +26,9 @@ constexpr double most_damping_factor = 3.0;
 // with the right modes was doubted.
 constexpr double residual_sigmas = 4.0;
 
+// A window with fewer degrees of freedom cannot tell.
+constexpr double least_dof = 8.0;
+
 // The late half strays from the whole: allowed in sigma of what the noise makes of that, and as a
 // part of the target.
 constexpr double late_sigmas = 2.5;
@@ -363,10 +366,7 @@ ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
     linearise_again(store, outputs_[0]);
     if (!solve_window()) return ModalVerdict::going_on;
   }
-  const double dof = solution_.samples - solution_.unknowns;
-  const double known = std::max(1.0, noise_[0].dof);
-  const double excess = solution_.residual_variance() / noise_[0].variance - 1.0;
-  if (dof >= 8.0 && excess > residual_sigmas * std::sqrt(2.0 / dof + 2.0 / known)) {
+  if (!residual_explained(0)) {
     doubt_ = ModalDoubt::residual;
     return ModalVerdict::abandoned;
   }
@@ -395,7 +395,46 @@ ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
     }
     return ModalVerdict::going_on;
   }
+  move_prior();
+  learn_noise(0);
+  if (!take_other_outputs(store)) {
+    doubt_ = ModalDoubt::residual;
+    return ModalVerdict::abandoned;
+  }
   return ModalVerdict::accepted;
+}
+
+bool ModalSettling::residual_explained(std::size_t output) const noexcept {
+  const double dof = solution_.samples - solution_.unknowns;
+  const double known = std::max(1.0, noise_[output].dof);
+  const double excess = solution_.residual_variance() / noise_[output].variance - 1.0;
+  return dof < least_dof || excess <= residual_sigmas * std::sqrt(2.0 / dof + 2.0 / known);
+}
+
+// The first output has judged the dwell; the others are solved over the same window, with the poles
+// as it has left them. The blocks are theirs from here on.
+bool ModalSettling::take_other_outputs(const ModalStore& store) noexcept {
+  const ModalSolution first = solution_;
+  bool explained = true;
+  for (std::size_t output = 1; output < outputs_.size(); ++output) {
+    std::copy(prior_.poles.begin(), prior_.poles.end(), poles_.begin());
+    believe();
+    relinearise_regression();
+    for (std::size_t i = 0; i < block_count_; ++i) {
+      accumulate(store, outputs_[output], blocks_.edge[i], blocks_.edge[i + 1], blocks_.sums[i]);
+    }
+    total(0, window_);
+    if (!solver_.solve(window_, {poles_.data(), prior_.modes}, belief_, noise_[output].variance,
+                       solution_)) {
+      explained = false;
+      continue;
+    }
+    explained = explained && residual_explained(output);
+    fill_result(store, output);
+    learn_noise(output);
+  }
+  solution_ = first;
+  return explained;
 }
 
 ModalVerdict ModalSettling::look(const ModalStore& store, std::uint64_t count) noexcept {
@@ -420,10 +459,11 @@ ModalVerdict ModalSettling::look(const ModalStore& store, std::uint64_t count) n
 void ModalSettling::conclude(const ModalStore& store) noexcept {
   if (block_count_ == 0 || doubt_ != ModalDoubt::none) return;
   if (!solve_window() || !fit_input(store)) return;
-  fill_result(store, 0);
+  if (fill_result(store, 0)) take_other_outputs(store);
 }
 
-void ModalSettling::learn() noexcept {
+// What the dwell has taught of the poles is where the next begins.
+void ModalSettling::move_prior() noexcept {
   std::size_t index = 0;
   for (std::size_t i = 0; i < prior_.modes; ++i) {
     const double sigma = poles_[i].sigma_rad_s + solution_.moved[index];
@@ -436,12 +476,15 @@ void ModalSettling::learn() noexcept {
   for (std::size_t i = 0; i < triangle(prior_.parameters()); ++i) {
     prior_.covariance[i] = forgetting * posterior_[i];
   }
-  OutputNoise& noise = noise_[0];
+}
+
+void ModalSettling::learn_noise(std::size_t output) noexcept {
+  OutputNoise& noise = noise_[output];
   const double dof = solution_.samples - solution_.unknowns;
   const double variance = solution_.residual_variance();
   noise.variance = (noise.variance * noise.dof + variance * dof) / (noise.dof + dof);
   noise.dof = std::min(noise.dof + dof, most_noise_dof);
-  memories_[0].learn(results_[0].estimate, task_.omega_rad_s / (2.0 * std::numbers::pi));
+  memories_[output].learn(results_[output].estimate, task_.omega_rad_s / (2.0 * std::numbers::pi));
 }
 
 }  // namespace sinerig

@@ -74,9 +74,6 @@ class ModalSettling {
                                                                            : next;
   }
 
-  // A dwell that was accepted teaches the next.
-  void learn() noexcept;
-
  private:
   static constexpr std::size_t most_blocks = 48;
   struct Blocks {
@@ -97,11 +94,15 @@ class ModalSettling {
   void linearise_again(const ModalStore& store, std::size_t channel) noexcept;
   void relinearise_regression() noexcept;
   void believe() noexcept;
+  void learn_noise(std::size_t output) noexcept;
   double noise_of_window(std::size_t output, const ModalSolution& solution) const noexcept;
   bool fill_result(const ModalStore& store, std::size_t output) noexcept;
   bool fit_input(const ModalStore& store) noexcept;
   bool target_met(double slack) const noexcept;
   bool late_half_agrees() noexcept;
+  bool residual_explained(std::size_t output) const noexcept;
+  bool take_other_outputs(const ModalStore& store) noexcept;
+  void move_prior() noexcept;
   ModalVerdict decide(const ModalStore& store) noexcept;
 
   std::vector<std::size_t> outputs_;
@@ -109,7 +110,6 @@ class ModalSettling {
   ModePrior prior_;
   bool known_ = false;
   PoleBelief belief_;
-  std::array<double, triangle(ModePrior::max_parameters)> precision_{};
   std::vector<OutputNoise> noise_;
   std::vector<NoiseMemory> memories_;
   std::vector<ModalResult> results_;
@@ -136,7 +136,6 @@ class ModalSettling {
   std::complex<double> input_;
   double input_residual_ = 0.0;
   ModalDoubt doubt_ = ModalDoubt::none;
-  // Of an accepted window, for learn().
   std::array<double, triangle(ModePrior::max_parameters)> posterior_{};
 };
 
