@@ -18,9 +18,10 @@ namespace {
 // beside it.
 constexpr double least_doubt = 1e-6;
 
-// A pole that is known to be zero no better than this is the constant of the regression, to which
-// it looks alike.
-constexpr double looks_like_rest_rad_s = 1e-3;
+// A real pole that moves by less than this over the record, or by no more than so many standard
+// errors, looks like the constant of the regression, which stands for it: an integrator.
+constexpr double looks_constant = 0.05;
+constexpr double looks_constant_sigmas = 4.0;
 
 // A transient that is gone by this part within the blind ticks is not seen in a dwell.
 constexpr double gone = 1e-5;
@@ -39,7 +40,7 @@ std::size_t size_of(std::complex<double> pole) {
 }
 
 // The poles that a dwell can see, those that ring longest first where there are too many.
-ModePrior prior_of(const identify::FoundModes& modes, double period_s) {
+ModePrior prior_of(const identify::FoundModes& modes, double period_s, double seconds) {
   ModePrior prior;
   prior.blind_ticks = most_delay_ticks + 1;
   std::vector<std::size_t> rows;  // of the covariance
@@ -47,7 +48,11 @@ ModePrior prior_of(const identify::FoundModes& modes, double period_s) {
   for (const std::complex<double>& pole : modes.poles) {
     const std::size_t size = size_of(pole);
     const double seen = std::exp(pole.real() * period_s * prior.blind_ticks);
-    const bool rests = pole.imag() == 0.0 && std::abs(pole.real()) < looks_like_rest_rad_s;
+    const auto at = static_cast<Eigen::Index>(row);
+    const double doubt = std::sqrt(modes.covariance(at, at));
+    const bool rests =
+        pole.imag() == 0.0 && std::abs(pole.real()) < std::max(looks_constant / seconds,
+                                                               looks_constant_sigmas * doubt);
     if (prior.modes < ModePrior::max_modes && seen > gone && !rests) {
       prior.poles[prior.modes++] = {.sigma_rad_s = pole.real(), .omega_rad_s = pole.imag()};
       for (std::size_t k = 0; k < size; ++k) rows.push_back(row + k);
@@ -138,7 +143,7 @@ bool IdentifiedModes::find(const ProbeRecord& record, KnownModes& found) noexcep
       found.noise_variance.push_back(modes.noise_variance);
       if (i > 0) continue;
       found.noise_dof = modes.degrees_of_freedom;
-      found.prior = prior_of(modes, record.period_s);
+      found.prior = prior_of(modes, record.period_s, record.period_s * static_cast<double>(motion.input.size()));
     }
     return true;
   } catch (const std::exception&) {

@@ -88,6 +88,15 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
   for (const Pair& pair : pairs_) outputs.push_back(pair.output);
   modal_ = std::make_unique<ModalSettling>(std::move(outputs), rate_hz);
   store_ = std::make_unique<ModalStore>(channels, most_stored);
+  solver_ = make_solver(Deputy::Where::at_once);
+}
+
+std::unique_ptr<Deputy> Measurement::make_solver(Deputy::Where where) {
+  return std::make_unique<Deputy>([this] { verdict_ = modal_->look(*store_, look_count_); }, where);
+}
+
+void Measurement::solve_elsewhere() {
+  if (modal_) solver_ = make_solver(Deputy::Where::own_thread);
 }
 
 void Measurement::know(const ModePrior& prior, std::span<const double> noise_variance,
@@ -132,6 +141,13 @@ void Measurement::start_modal() noexcept {
   refuted_ = false;
   modal_live_ = modal_ && modal_->knows() && dwell_->tones.size() == 1 && dwell_->bias_hz == 0.0;
   if (!modal_live_) return;
+  waiting_ = !solver_->idle();
+  if (!waiting_) begin_modal();
+}
+
+void Measurement::begin_modal() noexcept {
+  waiting_ = false;
+  looking_ = false;
   store_->clear();
   blind_left_ = modal_->prior().blind_ticks;
   const std::uint64_t before = dwell_->settle_samples + blind_left_;
@@ -144,16 +160,27 @@ void Measurement::start_modal() noexcept {
 }
 
 void Measurement::add_modal(Phasor tone, std::span<const Observation> observations) noexcept {
+  if (waiting_ && solver_->idle()) begin_modal();
+  if (waiting_) return;
   if (blind_left_ > 0) {
     --blind_left_;
     return;
   }
   store_->add(tone, observations);
-  if (store_->count() < modal_->next_look()) return;
-  const ModalVerdict verdict = modal_->look(*store_, store_->count());
-  if (verdict == ModalVerdict::going_on) return;
+  if (looking_ && solver_->idle()) hear_verdict();
+  if (looking_ || !modal_live_) return;
+  if (store_->count() < modal_->next_look() && !store_->full()) return;
+  look_count_ = store_->count();
+  looking_ = true;
+  solver_->ask();
+  if (solver_->idle()) hear_verdict();
+}
+
+void Measurement::hear_verdict() noexcept {
+  looking_ = false;
+  if (verdict_ == ModalVerdict::going_on) return;
   modal_live_ = false;
-  if (verdict == ModalVerdict::abandoned) {
+  if (verdict_ == ModalVerdict::abandoned) {
     refuted_ = modal_->doubt() == ModalDoubt::residual;
     return;
   }
@@ -347,7 +374,7 @@ void Measurement::judge() noexcept {
 
 void Measurement::conclude() noexcept {
   if (dwell_ == nullptr || done_) return;
-  if (modal_live_) {
+  if (modal_live_ && !waiting_ && solver_->idle()) {
     modal_->conclude(*store_);
     if (modal_->result(0).known) {
       take_modal();

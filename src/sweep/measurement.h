@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "sweep/deputy.h"
 #include "sweep/estimator.h"
 #include "sweep/modal_settling.h"
 #include "sweep/noise_memory.h"
@@ -34,6 +35,10 @@ class Measurement {
   // the judgement wants that. `noise_variance` per pair.
   void know(const ModePrior& prior, std::span<const double> noise_variance,
             double noise_dof) noexcept SINERIG_NONBLOCKING;
+
+  // Solving for modes takes longer than a tick: where time is real, it is done on another thread.
+  // Before the loop begins.
+  void solve_elsewhere();
 
   void start(const Dwell& dwell) noexcept SINERIG_NONBLOCKING;
 
@@ -87,7 +92,10 @@ class Measurement {
   Interval interval(const Result& result, double scale = 1.0) const noexcept {
     return interval_of(result.estimate.response, result.variance, result.left, scale);
   }
+  std::unique_ptr<Deputy> make_solver(Deputy::Where where);
   void start_modal() noexcept;
+  void begin_modal() noexcept;
+  void hear_verdict() noexcept;
   void add_modal(Phasor tone, std::span<const Observation> observations) noexcept;
   void take_modal() noexcept;
   void restart() noexcept;
@@ -120,6 +128,11 @@ class Measurement {
   // Where transients are modelled.
   std::unique_ptr<ModalSettling> modal_;
   std::unique_ptr<ModalStore> store_;
+  std::unique_ptr<Deputy> solver_;
+  std::uint64_t look_count_ = 0;   // samples that it is to look at
+  ModalVerdict verdict_ = ModalVerdict::going_on;
+  bool looking_ = false;       // it has been asked and not yet heard
+  bool waiting_ = false;       // it is busy with what has gone; this dwell begins when it is done
   bool modal_live_ = false;    // this dwell is still the model's
   bool by_model_ = false;      // … and it ended it
   bool refuted_ = false;       // … and it left more than the noise

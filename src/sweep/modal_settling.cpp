@@ -26,6 +26,10 @@ constexpr double most_damping_factor = 3.0;
 // with the right modes was doubted.
 constexpr double residual_sigmas = 4.0;
 
+// A window that does not determine the tone is waited for until it is this much longer than asked.
+constexpr std::uint64_t patient_windows = 2;
+constexpr std::uint64_t patient_samples = 200;
+
 // A window with fewer degrees of freedom cannot tell.
 constexpr double least_dof = 8.0;
 
@@ -359,12 +363,12 @@ bool ModalSettling::late_half_agrees() noexcept {
 }
 
 ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
-  if (!solve_window()) return ModalVerdict::going_on;
+  if (!solve_window()) return not_determined();
   for (int again = 0; again < 3 && needs_other_poles() && linearisations_ < most_linearisations;
        ++again) {
     ++linearisations_;
     linearise_again(store, outputs_[0]);
-    if (!solve_window()) return ModalVerdict::going_on;
+    if (!solve_window()) return not_determined();
   }
   if (!residual_explained(0)) {
     doubt_ = ModalDoubt::residual;
@@ -402,6 +406,14 @@ ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
     return ModalVerdict::abandoned;
   }
   return ModalVerdict::accepted;
+}
+
+// A window that is long enough by now and still says nothing never will.
+ModalVerdict ModalSettling::not_determined() noexcept {
+  const std::uint64_t enough = patient_windows * task_.least_samples + patient_samples;
+  if (blocks_end_ < enough) return ModalVerdict::going_on;
+  doubt_ = ModalDoubt::undetermined;
+  return ModalVerdict::abandoned;
 }
 
 bool ModalSettling::residual_explained(std::size_t output) const noexcept {

@@ -26,6 +26,7 @@ enum class ModalVerdict : std::uint8_t {
 enum class ModalDoubt : std::uint8_t {
   none,
   residual,      // more is left than the noise explains
+  undetermined,  // the window does not determine the tone beside the modes
   store_full,    // longer than what can be kept
   not_a_sine,    // what was applied has harmonics
 };
@@ -99,6 +100,7 @@ class ModalSettling {
   bool fill_result(const ModalStore& store, std::size_t output) noexcept;
   bool fit_input(const ModalStore& store) noexcept;
   bool target_met(double slack) const noexcept;
+  ModalVerdict not_determined() noexcept;
   bool late_half_agrees() noexcept;
   bool residual_explained(std::size_t output) const noexcept;
   bool take_other_outputs(const ModalStore& store) noexcept;

@@ -98,6 +98,7 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
       range_faults_(sensors.size()) {
+  if (settings_.real_time) measurement_.solve_elsewhere();
   if (settings_.modes) {
     measurement_.know(settings_.modes->prior, settings_.modes->noise_variance,
                       settings_.modes->noise_dof);
