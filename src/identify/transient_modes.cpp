@@ -21,6 +21,8 @@ using Eigen::VectorXd;
 constexpr double two_pi = 2.0 * std::numbers::pi;
 constexpr int least_ticks = 100;
 constexpr int relocations = 10;
+// Of a column of size one: below, what is left of it is rounding.
+constexpr double least_pivot = 1e-9;
 constexpr int most_refinements = 20;
 // The criterion has to rise this often in a row before more poles are not tried.
 constexpr int patience = 3;
@@ -207,20 +209,28 @@ class Problem {
     // The poles are the last columns: their corner of R is all that is needed.
     const MatrixXd corner =
         qr.matrixQR().bottomRightCorner(weighted.rows() - linear, order).topRows(order);
-    const MatrixXd r = corner.triangularView<Eigen::Upper>();
-    VectorXd pivots = r.diagonal().cwiseAbs();
-    if (pivots.size() > 0 && !(pivots.minCoeff() > 1e-10)) {
-      result.step = VectorXd::Zero(order);
-      result.covariance = MatrixXd::Constant(order, order, std::numeric_limits<double>::infinity());
-      return result;
+    MatrixXd r = corner.triangularView<Eigen::Upper>();
+    VectorXd wanted = projected.tail(order);
+    std::vector<Index> undetermined;
+    for (Index i = 0; i < order; ++i) {
+      if (std::abs(r(i, i)) > least_pivot) continue;
+      // An integrator looks like the constant: its pole stays where it is.
+      undetermined.push_back(i);
+      r.row(i).setZero();
+      r.col(i).setZero();
+      r(i, i) = 1.0;
+      wanted[i] = 0.0;
     }
     const MatrixXd inverse =
         r.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(order, order));
     const VectorXd tail_size = size.tail(order);
     result.step =
-        tail_size.cwiseInverse().cwiseProduct(VectorXd{inverse * projected.tail(order)});
+        tail_size.cwiseInverse().cwiseProduct(VectorXd{inverse * wanted});
     result.covariance = tail_size.cwiseInverse().asDiagonal() * (inverse * inverse.transpose()) *
                         tail_size.cwiseInverse().asDiagonal();
+    for (const Index i : undetermined) {
+      result.covariance(i, i) = std::numeric_limits<double>::infinity();
+    }
     return result;
   }
 

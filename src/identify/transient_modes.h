@@ -28,7 +28,8 @@ struct ModeSettings {
 struct FoundModes {
   // rad/s; a pair by the pole of positive imaginary part.
   std::vector<std::complex<double>> poles;
-  // Of (re, im) of the poles in their order, re alone for a real pole.
+  // Of (re, im) of the poles in their order, re alone for a real pole; infinite for a pole that the
+  // record does not tell from the constant.
   Eigen::MatrixXd covariance;
   double noise_variance = 0.0;  // of the output
   double degrees_of_freedom = 0.0;

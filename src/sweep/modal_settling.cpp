@@ -26,6 +26,9 @@ constexpr double most_damping_factor = 3.0;
 // with the right modes was doubted.
 constexpr double residual_sigmas = 4.0;
 
+// A residual of this part of the target, relative to the signal, is harmless.
+constexpr double harmless_part_of_target = 0.003;
+
 // A window that does not determine the tone is waited for until it is this much longer than asked.
 constexpr std::uint64_t patient_windows = 2;
 constexpr std::uint64_t patient_samples = 200;
@@ -171,12 +174,11 @@ bool ModalSettling::solve_window() noexcept {
     index += poles_[i].size();
   }
   total(0, window_);
-  return solver_.solve(window_, {poles_.data(), prior_.modes}, belief_, noise_[0].variance,
-                       solution_);
+  return solver_.solve(window_, {poles_.data(), prior_.modes}, belief_, expected_noise(0), solution_);
 }
 
 bool ModalSettling::needs_other_poles() const noexcept {
-  const double sigma = std::sqrt(noise_[0].variance);
+  const double sigma = std::sqrt(expected_noise(0));
   const auto begin = static_cast<double>(blocks_.edge[0]);
   const double seconds =
       static_cast<double>(blocks_.edge[block_count_] - blocks_.edge[0]) / rate_hz_;
@@ -221,12 +223,25 @@ void ModalSettling::linearise_again(const ModalStore& store, std::size_t channel
   }
 }
 
+// What the residual of the window may be: the noise, or a part of the target so small that no
+// transient of its size matters. Nothing real is linear to 120 dB.
+double ModalSettling::expected_noise(std::size_t output) const noexcept {
+  const double mean = window_.moments[2] / window_.count;
+  const double power = std::max(0.0, window_.square / window_.count - mean * mean);
+  const double target =
+      std::min(task_.target_db > 0.0 ? task_.target_db / db_per_relative : 1.0,
+               task_.target_deg > 0.0 ? task_.target_deg / degrees_per_radian : 1.0);
+  const double harmless = harmless_part_of_target * target;
+  return std::max(noise_[output].variance, harmless * harmless * power);
+}
+
 // s² of the window, pooled with what the noise has been: a short window hardly knows.
 double ModalSettling::noise_of_window(std::size_t output,
                                       const ModalSolution& solution) const noexcept {
   const double dof = std::max(1.0, solution.samples - solution.unknowns);
   const double known = std::min(noise_[output].dof, most_pooled_dof);
-  return (dof * solution.residual_variance() + known * noise_[output].variance) / (dof + known);
+  return (dof * solution.residual_variance() + known * expected_noise(output)) /
+         (dof + known);
 }
 
 // The applied tone over the window: it is a sine, without a transient.
@@ -349,7 +364,7 @@ bool ModalSettling::late_half_agrees() noexcept {
   std::size_t from = 0;
   while (from + 1 < block_count_ && blocks_.edge[from] < middle) ++from;
   total(from, cluster_);
-  if (!solver_.solve(cluster_, {poles_.data(), prior_.modes}, belief_, noise_[0].variance, late_)) {
+  if (!solver_.solve(cluster_, {poles_.data(), prior_.modes}, belief_, expected_noise(0), late_)) {
     return true;
   }
   const double variance = noise_of_window(0, solution_);
@@ -419,7 +434,7 @@ ModalVerdict ModalSettling::not_determined() noexcept {
 bool ModalSettling::residual_explained(std::size_t output) const noexcept {
   const double dof = solution_.samples - solution_.unknowns;
   const double known = std::max(1.0, noise_[output].dof);
-  const double excess = solution_.residual_variance() / noise_[output].variance - 1.0;
+  const double excess = solution_.residual_variance() / expected_noise(output) - 1.0;
   return dof < least_dof || excess <= residual_sigmas * std::sqrt(2.0 / dof + 2.0 / known);
 }
 
@@ -436,7 +451,7 @@ bool ModalSettling::take_other_outputs(const ModalStore& store) noexcept {
       accumulate(store, outputs_[output], blocks_.edge[i], blocks_.edge[i + 1], blocks_.sums[i]);
     }
     total(0, window_);
-    if (!solver_.solve(window_, {poles_.data(), prior_.modes}, belief_, noise_[output].variance,
+    if (!solver_.solve(window_, {poles_.data(), prior_.modes}, belief_, expected_noise(output),
                        solution_)) {
       explained = false;
       continue;

@@ -96,6 +96,7 @@ class ModalSettling {
   void relinearise_regression() noexcept;
   void believe() noexcept;
   void learn_noise(std::size_t output) noexcept;
+  double expected_noise(std::size_t output) const noexcept;
   double noise_of_window(std::size_t output, const ModalSolution& solution) const noexcept;
   bool fill_result(const ModalStore& store, std::size_t output) noexcept;
   bool fit_input(const ModalStore& store) noexcept;
