@@ -11,14 +11,19 @@ namespace {
 constexpr std::uint32_t window = (1U << 10U) - 1U;
 constexpr int most_abandoned = 1;
 
-// The modes are found anew this often; then no modes hold.
-constexpr int most_doubts = 2;
+// Modes are replaced this often; then none hold. Where they are found again and again and still
+// leave too much, the rig is no linear system: each dwell is judged by itself.
+constexpr int most_replacements = 2;
+constexpr int most_probes = 4;
 
 // Poles are the same within this many standard errors and this part of themselves: what a dwell
 // knows of them is linearised, and they do move a little with amplitude and temperature.
 constexpr double same_sigmas = 4.0;
 constexpr double same_decay = 0.05;
 constexpr double same_frequency = 1e-3;
+
+// Standard error of a decay, relative.
+constexpr double hardly = 0.05;
 
 }  // namespace
 
@@ -27,15 +32,15 @@ ModelTrust::ModelTrust(std::size_t dwells) : modelled_(dwells), condemned_(dwell
 void ModelTrust::dwell_ended(std::uint32_t dwell, bool modelled, bool abandoned) noexcept {
   modelled_[dwell] = modelled ? 1 : 0;
   recent_ = ((recent_ << 1U) | (abandoned ? 1U : 0U)) & window;
-  doubted_ = std::popcount(recent_) > most_abandoned && doubts_ <= most_doubts;
+  doubted_ = std::popcount(recent_) > most_abandoned && probes_ < most_probes;
 }
 
 ModelTrust::Judgement ModelTrust::probed(const KnownModes* found, const ModePrior& used) noexcept {
   doubted_ = false;
   recent_ = 0;
-  ++doubts_;
-  const bool give_up = found == nullptr || doubts_ > most_doubts;
-  if (!give_up && same_modes(found->prior, used)) return Judgement::confirmed;
+  ++probes_;
+  if (found != nullptr && same_modes(found->prior, used)) return Judgement::confirmed;
+  const bool give_up = found == nullptr || ++replacements_ > most_replacements;
   for (std::size_t i = 0; i < modelled_.size(); ++i) {
     if (modelled_[i] != 0) condemned_[i] = 1;
     modelled_[i] = 0;
@@ -49,9 +54,10 @@ std::uint32_t ModelTrust::next_condemned(std::uint32_t from) const noexcept {
   return dwell;
 }
 
-bool same_modes(const ModePrior& one, const ModePrior& other) noexcept {
-  if (one.modes != other.modes) return false;
-  // The order of the modes may differ: each has to have its like.
+namespace {
+
+// Each mode of one has its like in the other, whatever their order.
+bool has_all_of(const ModePrior& one, const ModePrior& other) noexcept {
   std::size_t row = 0;
   for (const ModePole& pole : one.known()) {
     bool found = false;
@@ -74,10 +80,18 @@ bool same_modes(const ModePrior& one, const ModePrior& other) noexcept {
       }
       other_row += like.size();
     }
-    if (!found) return false;
+    const double doubt = std::sqrt(one.covariance[triangle(row) + row]);
+    const bool hardly_known = pole.real() && doubt > hardly * std::abs(pole.sigma_rad_s);
+    if (!found && !hardly_known) return false;
     row += pole.size();
   }
   return true;
+}
+
+}  // namespace
+
+bool same_modes(const ModePrior& one, const ModePrior& other) noexcept {
+  return has_all_of(one, other) && has_all_of(other, one);
 }
 
 }  // namespace sinerig

@@ -42,11 +42,13 @@ class ModelTrust {
   std::vector<std::uint8_t> modelled_;
   std::vector<std::uint8_t> condemned_;
   std::uint32_t recent_ = 0;  // a bit per dwell, the last in the lowest: abandoned
-  int doubts_ = 0;
+  int probes_ = 0;
+  int replacements_ = 0;
   bool doubted_ = false;
 };
 
-// Whether two sets of modes are the same within what is known of them.
+// Whether two sets of modes are the same within what is known of them. Real poles that are hardly
+// known, fast ones that matter for a few ticks, may be in one of them only.
 bool same_modes(const ModePrior& one, const ModePrior& other) noexcept SINERIG_NONBLOCKING;
 
 }  // namespace sinerig
