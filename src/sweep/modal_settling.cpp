@@ -19,6 +19,7 @@ constexpr std::uint64_t blocks_per_window = 16;
 constexpr double far_rad = 0.06;
 constexpr double seen_sigmas = 0.2;
 constexpr int most_linearisations = 12;
+constexpr int most_at_once = 8;
 constexpr double least_damping_factor = 0.3;
 constexpr double most_damping_factor = 3.0;
 
@@ -379,7 +380,7 @@ bool ModalSettling::late_half_agrees() noexcept {
 
 ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
   if (!solve_window()) return not_determined();
-  for (int again = 0; again < 3 && needs_other_poles() && linearisations_ < most_linearisations;
+  for (int again = 0; again < most_at_once && needs_other_poles() && linearisations_ < most_linearisations;
        ++again) {
     ++linearisations_;
     linearise_again(store, outputs_[0]);
@@ -476,7 +477,7 @@ ModalVerdict ModalSettling::look(const ModalStore& store, std::uint64_t count) n
     const ModalVerdict verdict = decide(store);
     if (verdict != ModalVerdict::going_on) return verdict;
   }
-  if (store.full()) {
+  if (count == store.capacity()) {
     doubt_ = ModalDoubt::store_full;
     return ModalVerdict::abandoned;
   }

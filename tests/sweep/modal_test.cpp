@@ -111,7 +111,7 @@ struct Dwelt {
 
 Dwelt dwell(const ModePrior& prior, double noise_rms) {
   constexpr double tone_hz = 2.0;
-  ModalStore store{2, 4000};
+  ModalStore store{2, 5000};
   fill(store, tone_hz, noise_rms, 4000);
   ModalSettling settling{{1}, rate_hz};
   const double variance = noise_rms * noise_rms;
