@@ -51,8 +51,8 @@ ModePrior prior_of(const identify::FoundModes& modes, double period_s, double se
     const auto at = static_cast<Eigen::Index>(row);
     const double doubt = std::sqrt(modes.covariance(at, at));
     const bool rests =
-        pole.imag() == 0.0 && std::abs(pole.real()) < std::max(looks_constant / seconds,
-                                                               looks_constant_sigmas * doubt);
+        pole.imag() == 0.0 &&
+        std::abs(pole.real()) < std::max(looks_constant / seconds, looks_constant_sigmas * doubt);
     if (prior.modes < ModePrior::max_modes && seen > gone && !rests) {
       prior.poles[prior.modes++] = {.sigma_rad_s = pole.real(), .omega_rad_s = pole.imag()};
       for (std::size_t k = 0; k < size; ++k) rows.push_back(row + k);
@@ -61,8 +61,8 @@ ModePrior prior_of(const identify::FoundModes& modes, double period_s, double se
   }
   for (std::size_t i = 0; i < rows.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      prior.covariance[triangle(i) + j] = modes.covariance(
-          static_cast<Eigen::Index>(rows[i]), static_cast<Eigen::Index>(rows[j]));
+      prior.covariance[triangle(i) + j] =
+          modes.covariance(static_cast<Eigen::Index>(rows[i]), static_cast<Eigen::Index>(rows[j]));
     }
   }
   std::size_t index = 0;
@@ -102,11 +102,10 @@ KnownModes modes_of_file(const std::string& path, const std::vector<std::string>
     known.prior.poles[known.prior.modes++] = {.sigma_rad_s = mode.pole.real(),
                                               .omega_rad_s = mode.pole.imag()};
     const double natural = std::abs(mode.pole);
-    const double decay = std::hypot(moved_decay * mode.pole.real(),
-                                    natural * mode.damping.standard_error);
-    const double turn = natural * std::hypot(moved_frequency,
-                                             mode.frequency_hz.standard_error /
-                                                 mode.frequency_hz.value);
+    const double decay =
+        std::hypot(moved_decay * mode.pole.real(), natural * mode.damping.standard_error);
+    const double turn = natural * std::hypot(moved_frequency, mode.frequency_hz.standard_error /
+                                                                  mode.frequency_hz.value);
     const bool real = mode.pole.imag() == 0.0;
     known.prior.covariance[triangle(index) + index] =
         real ? std::max(decay, turn) * std::max(decay, turn) : decay * decay;
@@ -131,9 +130,10 @@ KnownModes modes_of_file(const std::string& path, const std::vector<std::string>
 bool IdentifiedModes::find(const ProbeRecord& record, KnownModes& found) noexcept {
   try {
     found = {};
-    identify::ModeSettings settings{.most_delay_ticks = most_delay_ticks,
-                                    .lowest_hz = record.low_hz,
-                                    .highest_hz = std::min(2.0 * record.high_hz, 0.4 / record.period_s)};
+    identify::ModeSettings settings{
+        .most_delay_ticks = most_delay_ticks,
+        .lowest_hz = record.low_hz,
+        .highest_hz = std::min(2.0 * record.high_hz, 0.4 / record.period_s)};
     identify::MotionRecord motion{.period_s = record.period_s,
                                   .input = {record.applied.begin(), record.applied.end()},
                                   .output = {}};
@@ -143,7 +143,8 @@ bool IdentifiedModes::find(const ProbeRecord& record, KnownModes& found) noexcep
       found.noise_variance.push_back(modes.noise_variance);
       if (i > 0) continue;
       found.noise_dof = modes.degrees_of_freedom;
-      found.prior = prior_of(modes, record.period_s, record.period_s * static_cast<double>(motion.input.size()));
+      found.prior = prior_of(modes, record.period_s,
+                             record.period_s * static_cast<double>(motion.input.size()));
     }
     return true;
   } catch (const std::exception&) {

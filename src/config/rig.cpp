@@ -134,7 +134,8 @@ Settling read_settling(const Section& section, const SweepSettings& sweep) {
   if (name == "fixed") return Settling::fixed;
   if (name == "detect") return Settling::detect;
   if (sweep.tones > 1) {
-    section.refuse("settling", "\"model\" measures one tone at a time; set tones = 1 or \"detect\"");
+    section.refuse("settling",
+                   "\"model\" measures one tone at a time; set tones = 1 or \"detect\"");
   }
   if (sweep.bias_amplitude > 0.0) {
     section.refuse("settling",

@@ -155,7 +155,7 @@ class Problem {
   struct Fit {
     std::vector<Complex> poles;
     double rss = std::numeric_limits<double>::infinity();
-    VectorXd step;  // of the poles' parameters
+    VectorXd step;        // of the poles' parameters
     MatrixXd covariance;  // for a noise of one
     double scale = 1.0;
   };
@@ -224,8 +224,7 @@ class Problem {
     const MatrixXd inverse =
         r.triangularView<Eigen::Upper>().solve(MatrixXd::Identity(order, order));
     const VectorXd tail_size = size.tail(order);
-    result.step =
-        tail_size.cwiseInverse().cwiseProduct(VectorXd{inverse * wanted});
+    result.step = tail_size.cwiseInverse().cwiseProduct(VectorXd{inverse * wanted});
     result.covariance = tail_size.cwiseInverse().asDiagonal() * (inverse * inverse.transpose()) *
                         tail_size.cwiseInverse().asDiagonal();
     for (const Index i : undetermined) {
@@ -259,13 +258,13 @@ class Problem {
     std::vector<Complex> next;
     Index at = 0;
     for (const Complex& pole : poles) {
-      const double sigma = std::clamp(pole.real() + scale * step[at], 3.0 * pole.real(),
-                                      0.3 * pole.real());
+      const double sigma =
+          std::clamp(pole.real() + scale * step[at], 3.0 * pole.real(), 0.3 * pole.real());
       if (is_real(pole)) {
         next.emplace_back(sigma, 0.0);
       } else {
-        const double omega = std::clamp(pole.imag() + scale * step[at + 1], 0.7 * pole.imag(),
-                                        1.4 * pole.imag());
+        const double omega =
+            std::clamp(pole.imag() + scale * step[at + 1], 0.7 * pole.imag(), 1.4 * pole.imag());
         next.emplace_back(sigma, omega);
       }
       at += size_of(pole);
@@ -345,8 +344,7 @@ FoundModes find_modes(const MotionRecord& record, const ModeSettings& settings) 
     for (int i = 0; i < relocations; ++i) poles = problem.relocated(poles);
     const Problem::Fit fit = problem.refined(poles);
     const double parameters = 3.0 * static_cast<double>(order_of(fit.poles));
-    const double criterion =
-        samples * std::log(fit.rss / samples) + parameters * std::log(samples);
+    const double criterion = samples * std::log(fit.rss / samples) + parameters * std::log(samples);
     if (criterion < best_criterion) {
       best_criterion = criterion;
       best = fit;

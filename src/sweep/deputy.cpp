@@ -14,7 +14,9 @@ constexpr std::chrono::microseconds look_interval{200};
 
 Deputy::Deputy(std::function<void()> job, Where where) : job_{std::move(job)} {
   if (where == Where::own_thread) {
-    thread_ = std::jthread{[this](const std::stop_token& stop) { work(stop); }};
+    thread_ = std::jthread{[this](const std::stop_token& stop) {
+      work(stop);
+    }};
   }
 }
 

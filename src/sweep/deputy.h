@@ -23,9 +23,7 @@ class Deputy {
 
   // To be asked only while idle.
   void ask() noexcept SINERIG_NONBLOCKING;
-  bool idle() const noexcept SINERIG_NONBLOCKING {
-    return !asked_.load(std::memory_order_acquire);
-  }
+  bool idle() const noexcept SINERIG_NONBLOCKING { return !asked_.load(std::memory_order_acquire); }
 
  private:
   void work(const std::stop_token& stop) noexcept;

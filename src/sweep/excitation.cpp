@@ -87,8 +87,8 @@ double Excitation::tones() const noexcept {
   if (tones_ == 0) {
     const double value = elapsed_ < waveform_.size() ? waveform_[elapsed_] : 0.0;
     if (elapsed_ >= ramp_samples_) return value;
-    return value + handover_ * (1.0 - static_cast<double>(elapsed_) /
-                                          static_cast<double>(ramp_samples_));
+    return value +
+           handover_ * (1.0 - static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_));
   }
   double sum = 0.0;
   for (std::size_t i = 0; i < tones_; ++i) {

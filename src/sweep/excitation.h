@@ -27,7 +27,8 @@ class Excitation {
 
   // Begins a waveform laid on the baseline, one value per tick, zero beyond its end. Over the ramp
   // the tones before fade out.
-  void start(std::span<const double> waveform, std::uint64_t ramp_samples) noexcept SINERIG_NONBLOCKING;
+  void start(std::span<const double> waveform,
+             std::uint64_t ramp_samples) noexcept SINERIG_NONBLOCKING;
 
   // Moves on by `ticks`.
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;

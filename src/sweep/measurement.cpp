@@ -417,7 +417,7 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   }
   const Interval half = interval(each);
   const double gain = std::abs(estimate.response);
-  point.settled_by = by_model_                                 ? SettledBy::model
+  point.settled_by = by_model_                                ? SettledBy::model
                      : judgement_.settling == Settling::fixed ? SettledBy::wait
                                                               : SettledBy::detection;
   point.response = estimate.response;

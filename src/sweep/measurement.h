@@ -129,13 +129,13 @@ class Measurement {
   std::unique_ptr<ModalSettling> modal_;
   std::unique_ptr<ModalStore> store_;
   std::unique_ptr<Deputy> solver_;
-  std::uint64_t look_count_ = 0;   // samples that it is to look at
+  std::uint64_t look_count_ = 0;  // samples that it is to look at
   ModalVerdict verdict_ = ModalVerdict::going_on;
-  bool looking_ = false;       // it has been asked and not yet heard
-  bool waiting_ = false;       // it is busy with what has gone; this dwell begins when it is done
-  bool modal_live_ = false;    // this dwell is still the model's
-  bool by_model_ = false;      // … and it ended it
-  bool refuted_ = false;       // … and it left more than the noise
+  bool looking_ = false;     // it has been asked and not yet heard
+  bool waiting_ = false;     // it is busy with what has gone; this dwell begins when it is done
+  bool modal_live_ = false;  // this dwell is still the model's
+  bool by_model_ = false;    // … and it ended it
+  bool refuted_ = false;     // … and it left more than the noise
   std::uint64_t blind_left_ = 0;
 
   const Dwell* dwell_ = nullptr;

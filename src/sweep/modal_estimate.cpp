@@ -32,7 +32,8 @@ void ModalSolver::find_visible(const ModalSums& sums, std::span<const ModePole> 
   std::size_t row = tone_columns;
   for (std::size_t i = 0; i < poles.size(); ++i) {
     double power = 0.0;
-    for (std::size_t k = 0; k < poles[i].size(); ++k) power += sums.gram[triangle(row + k) + row + k];
+    for (std::size_t k = 0; k < poles[i].size(); ++k)
+      power += sums.gram[triangle(row + k) + row + k];
     visible_[i] = power * most > invisible * noise_variance && power > 0.0;
     row += 2 * poles[i].size();
   }
@@ -107,8 +108,7 @@ void ModalSolver::gather(const ModalSums& sums, const PoleBelief& belief,
       double sum = 0.0;
       for (std::size_t k = 0; k < one.count; ++k) {
         for (std::size_t l = 0; l < other.count; ++l) {
-          sum += one.value[k] * other.value[l] *
-                 element(sums.gram, one.row[k], other.row[l]);
+          sum += one.value[k] * other.value[l] * element(sums.gram, one.row[k], other.row[l]);
         }
       }
       hessian_[triangle(i) + j] = weight * sum;
@@ -172,8 +172,7 @@ bool ModalSolver::solve(const ModalSums& sums, std::span<const ModePole> poles,
     const std::size_t first = tone_columns + parameters_;
     for (std::size_t i = 0; i < parameters_; ++i) {
       for (std::size_t j = 0; j < parameters_; ++j) {
-        step_[first + i] -=
-            element(belief.precision, i, j) * (solution.moved[j] - belief.mean[j]);
+        step_[first + i] -= element(belief.precision, i, j) * (solution.moved[j] - belief.mean[j]);
       }
     }
     if (!solver_.factor(hessian_, columns_)) return false;

@@ -55,8 +55,8 @@ class ModalSolver {
 
   // Of the last solution: how much the tone (b + j a) moves with a column's moment, one at a time:
   // the two rows of H⁻¹Jᵀ that belong to sine and cosine, for the influence of parts of a window.
-  void tone_gain(std::span<double> by_sine, std::span<double> by_cosine) noexcept
-      SINERIG_NONBLOCKING;
+  void tone_gain(std::span<double> by_sine,
+                 std::span<double> by_cosine) noexcept SINERIG_NONBLOCKING;
 
   // gᵀ C g, C the covariance of the columns' coefficients for a noise of one, poles included: what
   // the fit takes out of a moment g.

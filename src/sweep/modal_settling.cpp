@@ -175,7 +175,8 @@ bool ModalSettling::solve_window() noexcept {
     index += poles_[i].size();
   }
   total(0, window_);
-  return solver_.solve(window_, {poles_.data(), prior_.modes}, belief_, expected_noise(0), solution_);
+  return solver_.solve(window_, {poles_.data(), prior_.modes}, belief_, expected_noise(0),
+                       solution_);
 }
 
 bool ModalSettling::needs_other_poles() const noexcept {
@@ -241,8 +242,7 @@ double ModalSettling::noise_of_window(std::size_t output,
                                       const ModalSolution& solution) const noexcept {
   const double dof = std::max(1.0, solution.samples - solution.unknowns);
   const double known = std::min(noise_[output].dof, most_pooled_dof);
-  return (dof * solution.residual_variance() + known * expected_noise(output)) /
-         (dof + known);
+  return (dof * solution.residual_variance() + known * expected_noise(output)) / (dof + known);
 }
 
 // The applied tone over the window: it is a sine, without a transient.
@@ -272,8 +272,8 @@ bool ModalSettling::fit_input(const ModalStore& store) noexcept {
   double left = sums.square;
   for (std::size_t i = 0; i < 3; ++i) left -= beta[i] * sums.moments[i];
   input_residual_ = left / std::max(sums.square, 1e-300);
-  input_ = std::complex<double>{beta[1], beta[0]} *
-           turn(task_.omega_rad_s, store.common_offset_ns(0));
+  input_ =
+      std::complex<double>{beta[1], beta[0]} * turn(task_.omega_rad_s, store.common_offset_ns(0));
   return std::abs(input_) > 0.0;
 }
 
@@ -339,11 +339,11 @@ bool ModalSettling::fill_result(const ModalStore& store, std::size_t output) noe
                        .dof = std::min(noise_[output].dof, most_pooled_dof)};
   }
   // The white variance is known much better; it stands where nothing speaks against it.
-  const double colour =
-      result.variance.covariance.mean_variance() / estimate.white.mean_variance();
+  const double colour = result.variance.covariance.mean_variance() / estimate.white.mean_variance();
   if (colour < 1.0 + coloured_sigmas * std::sqrt(2.0 / result.variance.dof)) {
     result.variance.covariance = estimate.white;
-    result.variance.dof = std::max(result.variance.dof, std::min(noise_[output].dof, most_pooled_dof));
+    result.variance.dof =
+        std::max(result.variance.dof, std::min(noise_[output].dof, most_pooled_dof));
     result.variance.expected = 1.0;
   }
   result.known = true;
@@ -370,17 +370,19 @@ bool ModalSettling::late_half_agrees() noexcept {
   }
   const double variance = noise_of_window(0, solution_);
   const double shift = std::abs(late_.tone - solution_.tone);
-  const double gained = variance * (largest_eigenvalue(late_.covariance) -
-                                    largest_eigenvalue(solution_.covariance));
-  const double target = std::min(task_.target_db > 0.0 ? task_.target_db / db_per_relative : 1.0,
-                                 task_.target_deg > 0.0 ? task_.target_deg / degrees_per_radian : 1.0);
+  const double gained =
+      variance * (largest_eigenvalue(late_.covariance) - largest_eigenvalue(solution_.covariance));
+  const double target =
+      std::min(task_.target_db > 0.0 ? task_.target_db / db_per_relative : 1.0,
+               task_.target_deg > 0.0 ? task_.target_deg / degrees_per_radian : 1.0);
   return shift <= std::max(late_part_of_target * target * std::abs(solution_.tone),
                            late_sigmas * std::sqrt(std::max(0.0, gained)));
 }
 
 ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
   if (!solve_window()) return not_determined();
-  for (int again = 0; again < most_at_once && needs_other_poles() && linearisations_ < most_linearisations;
+  for (int again = 0;
+       again < most_at_once && needs_other_poles() && linearisations_ < most_linearisations;
        ++again) {
     ++linearisations_;
     linearise_again(store, outputs_[0]);
@@ -394,9 +396,9 @@ ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
   if (length < task_.least_samples) return ModalVerdict::going_on;
   const double white = noise_of_window(0, solution_) * largest_eigenvalue(solution_.covariance) /
                        std::norm(solution_.tone);
-  const double wanted = std::min(
-      task_.target_db > 0.0 ? task_.target_db / db_per_relative : 1.0,
-      task_.target_deg > 0.0 ? task_.target_deg / degrees_per_radian : 1.0);
+  const double wanted =
+      std::min(task_.target_db > 0.0 ? task_.target_db / db_per_relative : 1.0,
+               task_.target_deg > 0.0 ? task_.target_deg / degrees_per_radian : 1.0);
   if (4.0 * white > 2.0 * wanted * wanted) return ModalVerdict::going_on;
   if (!fit_input(store)) return ModalVerdict::going_on;
   if (input_residual_ > 1e-12) {

@@ -71,8 +71,8 @@ bool has_all_of(const ModePrior& one, const ModePrior& other) noexcept {
         };
         const double decay = std::abs(pole.sigma_rad_s - like.sigma_rad_s);
         const double turn = std::abs(pole.omega_rad_s - like.omega_rad_s);
-        const bool same_sigma = decay <= same_sigmas * std::sqrt(variance(0)) +
-                                             same_decay * std::abs(pole.sigma_rad_s);
+        const bool same_sigma =
+            decay <= same_sigmas * std::sqrt(variance(0)) + same_decay * std::abs(pole.sigma_rad_s);
         const bool same_omega =
             pole.real() || turn <= same_sigmas * std::sqrt(variance(1)) +
                                        same_frequency * std::abs(pole.omega_rad_s);

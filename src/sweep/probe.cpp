@@ -29,8 +29,8 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   const std::vector<double> asked = asked_frequencies(sweep);
   const auto [low, high] = std::minmax_element(asked.begin(), asked.end());
   Probe probe{.command = {}, .quiet_samples = 0, .low_hz = *low, .high_hz = *high};
-  const double wanted = sweep.probe_s > 0.0 ? sweep.probe_s * rate_hz
-                                            : cycles_of_lowest / probe.low_hz * rate_hz;
+  const double wanted =
+      sweep.probe_s > 0.0 ? sweep.probe_s * rate_hz : cycles_of_lowest / probe.low_hz * rate_hz;
   const double ticks = std::clamp(wanted, least_ticks, most_ticks);
   const auto quiet = static_cast<std::size_t>(quiet_part * ticks);
   const auto length = static_cast<std::size_t>(ticks);

@@ -24,8 +24,8 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
 // they are found.
 class Prober {
  public:
-  // `outputs`: channels of the regression, one per response. Without a finder, or a waveform, it has
-  // nothing to do; nor has it at the start of a sweep that knows its modes.
+  // `outputs`: channels of the regression, one per response. Without a finder, or a waveform, it
+  // has nothing to do; nor has it at the start of a sweep that knows its modes.
   Prober(const Probe& probe, const std::vector<std::size_t>& outputs, double rate_hz,
          ModeFinder* finder, bool at_start, Deputy::Where where);
 

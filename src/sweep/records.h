@@ -114,8 +114,8 @@ enum class EventKind : std::uint8_t {
   started,
   probed,  // the first pass has ended; value: modes found
   dwell_began,
-  model_doubted,    // value: what came of it: 0 confirmed, 1 replaced, 2 given up
-  remeasured,       // the dwell begins once more: its model turned out wrong
+  model_doubted,   // value: what came of it: 0 confirmed, 1 replaced, 2 given up
+  remeasured,      // the dwell begins once more: its model turned out wrong
   retried,         // value: amplitude of the next try
   refined,         // a dwell was added; value: disagreement that called for it, dB; candidate
   gap,             // value: ticks skipped

@@ -12,9 +12,9 @@
 #include "sweep/excitation.h"
 #include "sweep/excitation_check.h"
 #include "sweep/guard.h"
+#include "sweep/known_modes.h"
 #include "sweep/leveller.h"
 #include "sweep/measurement.h"
-#include "sweep/known_modes.h"
 #include "sweep/model_trust.h"
 #include "sweep/plan.h"
 #include "sweep/probe.h"
@@ -39,7 +39,7 @@ struct RunnerSettings {
   std::optional<KnownModes> modes{};  // for settling by a model; without, the finder is asked
   ModeFinder* finder = nullptr;       // must outlive the runner
   bool real_time = false;             // what takes long is done on other threads
-  double max_gap_s = 1.0;        // without a tick: the machine slept, nobody minded the actuator
+  double max_gap_s = 1.0;  // without a tick: the machine slept, nobody minded the actuator
 };
 
 struct RunOutcome {

@@ -33,13 +33,13 @@ const std::vector<Case>& cases();
 
 // What goes wrong beside the noise.
 struct Trouble {
-  bool pink = false;          // the noise is 1/f
-  double lost = 0.0;          // part of the samples
-  bool told = false;          // the modes are told, not found
-  double frequency = 0.0;     // how wrong they are told, relative
+  bool pink = false;       // the noise is 1/f
+  double lost = 0.0;       // part of the samples
+  bool told = false;       // the modes are told, not found
+  double frequency = 0.0;  // how wrong they are told, relative
   double decay = 0.0;
-  double missing_hz = 0.0;    // a mode that is not told
-  double added_hz = 0.0;      // a mode that there is not
+  double missing_hz = 0.0;  // a mode that is not told
+  double added_hz = 0.0;    // a mode that there is not
 };
 
 // All sweeps of a cell together.
@@ -49,8 +49,8 @@ struct Tally {
   double within_or_flagged = 0.0;
   double coverage = 0.0;
   double worst_db = 0.0;
-  double detected = 0.0;  // points per sweep whose transient was waited for
-  std::uint32_t silent = 0;  // good points beyond twice the target
+  double detected = 0.0;         // points per sweep whose transient was waited for
+  std::uint32_t silent = 0;      // good points beyond twice the target
   std::uint32_t beyond_cap = 0;  // dwells longer than they may be
 };
 

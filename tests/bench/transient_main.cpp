@@ -47,7 +47,8 @@ constexpr const char* head =
 
 int bench_time(const Options& options) {
   std::printf(
-      "\nBench time against the best fixed rule with a minimum time, nothing told of the plant, the "
+      "\nBench time against the best fixed rule with a minimum time, nothing told of the plant, "
+      "the "
       "first pass included; %u sweeps\nbounds: g1-g3 0.13 at 80 dB (0.08 with half a cycle), 0.18 "
       "at 60 dB, 0.30 levelled 20 dB; g4 1.05; within >= 95 %%; no dwell beyond its cap\n\n%s",
       options.seeds, head);
@@ -60,9 +61,9 @@ int bench_time(const Options& options) {
       char name[80];
       std::snprintf(name, sizeof name, "%s, %.1f cycles: %.3f (%.2f)", each.name.c_str(), cycles,
                     ratio, bound_of(each, cycles));
-      missed += print(name, tally,
-                      ratio <= bound_of(each, cycles) && tally.within >= 0.95 &&
-                          tally.beyond_cap == 0);
+      missed +=
+          print(name, tally,
+                ratio <= bound_of(each, cycles) && tally.within >= 0.95 && tally.beyond_cap == 0);
     }
   }
   return missed;
@@ -86,8 +87,8 @@ int coverage(const Options& options) {
     for (const Case& each : cases()) {
       if (!options.wants(each.name)) continue;
       const Tally tally = measure(each, options, 1.0, trouble);
-      missed += print(each.name + " " + name, tally,
-                      tally.coverage >= 0.93 && tally.coverage <= 0.97);
+      missed +=
+          print(each.name + " " + name, tally, tally.coverage >= 0.93 && tally.coverage <= 0.97);
     }
   }
   return missed;
@@ -95,7 +96,8 @@ int coverage(const Options& options) {
 
 int order(const Options& options) {
   std::printf(
-      "\nA mode is missing from what was told, or one too many; %u sweeps; bounds: within or flagged "
+      "\nA mode is missing from what was told, or one too many; %u sweeps; bounds: within or "
+      "flagged "
       ">= 95 %%, no good point beyond twice the target\n\n%s",
       options.seeds, head);
   const std::vector<std::pair<std::string, std::vector<double>>> missing{
@@ -103,8 +105,8 @@ int order(const Options& options) {
   int missed = 0;
   const auto run = [&](const Case& each, const Trouble& trouble, const std::string& what) {
     const Tally tally = measure(each, options, 1.0, trouble);
-    missed += print(each.name + " " + what, tally,
-                    tally.within_or_flagged >= 0.95 && tally.silent == 0);
+    missed +=
+        print(each.name + " " + what, tally, tally.within_or_flagged >= 0.95 && tally.silent == 0);
   };
   for (const Case& each : cases()) {
     if (!options.wants(each.name)) continue;
@@ -170,9 +172,10 @@ constexpr Part parts[] = {
     {"time", bench_time}, {"coverage", coverage}, {"order", order}, {"tick", tick}};
 
 int usage() {
-  std::fprintf(stderr,
-               "transient [time|coverage|order|tick] [--seeds N] [--first-seed S] [--case g1_80 …]\n"
-               "Without a part: all of them. Cases: g1 to g4, _80, _60 and _20 dB.\n");
+  std::fprintf(
+      stderr,
+      "transient [time|coverage|order|tick] [--seeds N] [--first-seed S] [--case g1_80 …]\n"
+      "Without a part: all of them. Cases: g1 to g4, _80, _60 and _20 dB.\n");
   return 2;
 }
 

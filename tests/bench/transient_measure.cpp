@@ -33,7 +33,9 @@ void tell(ModePrior& prior, ModePole pole, double frequency, double decay) {
 
 KnownModes told(const QualityCase& of, const Trouble& trouble, std::uint64_t seed) {
   std::mt19937_64 random{seed};
-  const auto sign = [&] { return std::bernoulli_distribution{0.5}(random) ? 1.0 : -1.0; };
+  const auto sign = [&] {
+    return std::bernoulli_distribution{0.5}(random) ? 1.0 : -1.0;
+  };
   KnownModes known;
   known.noise_variance = {of.noise_rms * of.noise_rms};
   known.noise_dof = 100.0;
@@ -60,12 +62,12 @@ KnownModes told(const QualityCase& of, const Trouble& trouble, std::uint64_t see
 
 const std::vector<Case>& cases() {
   static const std::vector<Case> all{
-      {"g1_80", "g1", Noise::n80, 174.8}, {"g1_60", "g1", Noise::n60, 302.8},
-      {"g1_20", "g1", Noise::l20, 214.1}, {"g2_80", "g2", Noise::n80, 303.6},
+      {"g1_80", "g1", Noise::n80, 174.8},  {"g1_60", "g1", Noise::n60, 302.8},
+      {"g1_20", "g1", Noise::l20, 214.1},  {"g2_80", "g2", Noise::n80, 303.6},
       {"g2_60", "g2", Noise::n60, 2658.3}, {"g2_20", "g2", Noise::l20, 462.5},
-      {"g3_80", "g3", Noise::n80, 273.6}, {"g3_60", "g3", Noise::n60, 316.0},
-      {"g3_20", "g3", Noise::l20, 301.1}, {"g4_80", "g4", Noise::n80, 23.3},
-      {"g4_60", "g4", Noise::n60, 80.7},  {"g4_20", "g4", Noise::l20, 58.0}};
+      {"g3_80", "g3", Noise::n80, 273.6},  {"g3_60", "g3", Noise::n60, 316.0},
+      {"g3_20", "g3", Noise::l20, 301.1},  {"g4_80", "g4", Noise::n80, 23.3},
+      {"g4_60", "g4", Noise::n60, 80.7},   {"g4_20", "g4", Noise::l20, 58.0}};
   return all;
 }
 
@@ -90,16 +92,14 @@ Tally measure(const Case& of, const Options& options, double cycles, const Troub
     RunnerSettings settings;
     settings.finder = &finder;
     if (trouble.told) settings.modes = told(cell, trouble, seed);
-    const test::VirtualRun run =
-        test::run_virtual(cell.plan, rig, test::open_guard(1), settings);
+    const test::VirtualRun run = test::run_virtual(cell.plan, rig, test::open_guard(1), settings);
     // A dwell that was measured again counts as it was left.
     std::map<std::uint32_t, Point> last;
     for (const Point& point : run.sink.points) last[point.dwell] = point;
     bool within = true;
     bool honest = true;
     for (const auto& [dwell, point] : last) {
-      const auto error =
-          quality::error_of(point.response, plant.response(point.frequency_hz));
+      const auto error = quality::error_of(point.response, plant.response(point.frequency_hz));
       const bool good = point.status == PointStatus::good;
       const bool inside = quality::within_bounds(error);
       within = within && inside;
@@ -109,8 +109,8 @@ Tally measure(const Case& of, const Options& options, double cycles, const Troub
       points += 1.0;
       tally.worst_db = std::max(tally.worst_db, error.gain_db);
       tally.detected += point.settled_by == SettledBy::model ? 0.0 : 1.0;
-      const bool gross = error.gain_db > 2.0 * quality::bound_db ||
-                         error.phase_deg > 2.0 * quality::bound_deg;
+      const bool gross =
+          error.gain_db > 2.0 * quality::bound_db || error.phase_deg > 2.0 * quality::bound_deg;
       tally.silent += good && gross ? 1 : 0;
       const double cap =
           static_cast<double>(cell.plan.dwells[dwell].max_samples + 1) / cell.plan.rate_hz;

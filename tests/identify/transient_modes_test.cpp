@@ -1,4 +1,6 @@
 // Modes from a short record: the poles that the record was made with come back.
+#include "identify/transient_modes.h"
+
 #include <cmath>
 #include <complex>
 #include <numbers>
@@ -6,8 +8,6 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-
-#include "identify/transient_modes.h"
 
 namespace sinerig::identify {
 namespace {
@@ -45,16 +45,14 @@ MotionRecord record_of(double noise_rms) {
 }
 
 TEST(FindModes, FindsOrderAndPolesWithinTheirErrors) {
-  const FoundModes found =
-      find_modes(record_of(1e-3), {.lowest_hz = 0.5, .highest_hz = 400.0});
+  const FoundModes found = find_modes(record_of(1e-3), {.lowest_hz = 0.5, .highest_hz = 400.0});
   ASSERT_EQ(found.poles.size(), 2U);
   const bool real_first = found.poles[0].imag() == 0.0;
   const std::complex<double> pair = found.poles[real_first ? 1 : 0];
   const std::complex<double> real = found.poles[real_first ? 0 : 1];
   const Eigen::Index pair_row = real_first ? 1 : 0;
   const Eigen::Index real_row = real_first ? 0 : 2;
-  EXPECT_NEAR(pair.real(), ringing.real(),
-              4.0 * std::sqrt(found.covariance(pair_row, pair_row)));
+  EXPECT_NEAR(pair.real(), ringing.real(), 4.0 * std::sqrt(found.covariance(pair_row, pair_row)));
   EXPECT_NEAR(pair.imag(), ringing.imag(),
               4.0 * std::sqrt(found.covariance(pair_row + 1, pair_row + 1)));
   EXPECT_NEAR(real.real(), slow.real(), 4.0 * std::sqrt(found.covariance(real_row, real_row)));

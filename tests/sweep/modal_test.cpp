@@ -222,8 +222,8 @@ TEST(ModelledSweep, EndsBeforeItsTransientsDo) {
   const ModePole pole{.sigma_rad_s = sigma,
                       .omega_rad_s = std::sqrt(std::pow(two_pi * 8.0, 2) - sigma * sigma)};
   RunnerSettings settings;
-  settings.modes = KnownModes{
-      .prior = prior_of({pole}, 0.01), .noise_variance = {1e-10}, .noise_dof = 100.0};
+  settings.modes =
+      KnownModes{.prior = prior_of({pole}, 0.01), .noise_variance = {1e-10}, .noise_dof = 100.0};
   SweepSettings sweep = modelled_sweep();
   const test::VirtualRun modelled =
       test::run_virtual(plan_sweep(sweep, {}, rate_hz), rig, test::open_guard(1), settings);
