@@ -7,6 +7,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include "cli/found_modes.h"
 #include "cli/live_view.h"
 #include "cli/real_time.h"
 #include "cli/report_file.h"
@@ -186,6 +187,16 @@ std::string put_down_end(record::SweepWriter& writer, const RunEnd& end) {
   }
 }
 
+// Of the sweep file that the rig names; without one they have to be found.
+std::optional<KnownModes> earlier_modes(const config::Rig& rig) {
+  if (rig.prior.empty()) return std::nullopt;
+  std::vector<std::string> outputs;
+  for (const Pair& pair : rig.runner.responses) {
+    outputs.push_back(rig.sensors.at(pair.output - 1).name);
+  }
+  return modes_of_file(rig.prior, outputs);
+}
+
 void refuse_other_dwells(const record::UnfinishedRun& earlier, const std::string& path,
                          const SweepRunner& runner) {
   SweepPlan reached{.rate_hz = earlier.stored.plan.rate_hz, .dwells = {}};
@@ -213,6 +224,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
                const OpenSweepFile& open_file, const record::UnfinishedRun* earlier) {
   const config::Rig& rig = configured.rig();
   Clock& clock = configured.clock();
+  const std::optional<KnownModes> modes = earlier_modes(rig);
   const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   RunControl control;
   const StopOnSignal stop_on_signal{control};
@@ -231,6 +243,10 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
   Guard guard{rig.guard, clock.grid().period_s()};
   RunnerSettings settings = rig.runner;
   if (view) settings.record_samples = true;
+  IdentifiedModes finder;
+  settings.finder = &finder;
+  settings.real_time = in_real_time;
+  settings.modes = modes;
   std::unique_ptr<SweepRunner> runner;
   bool to_measure = true;
   try {

@@ -146,6 +146,21 @@ Level read_level(const Section& section) {
   return level;
 }
 
+Settling read_settling(const Section& section, const SweepSettings& sweep) {
+  const std::string name = section.choice("settling", {"detect", "fixed", "model"});
+  if (name == "fixed") return Settling::fixed;
+  if (name == "detect") return Settling::detect;
+  if (sweep.tones > 1) {
+    section.refuse("settling",
+                   "\"model\" measures one tone at a time; set tones = 1 or \"detect\"");
+  }
+  if (sweep.bias_amplitude > 0.0) {
+    section.refuse("settling",
+                   "\"model\" knows no bias motion; set bias_amplitude = 0 or \"detect\"");
+  }
+  return Settling::model;
+}
+
 SweepSettings read_sweep(const Section& section, double rate_hz) {
   SweepSettings sweep;
   read_frequencies(section, rate_hz, sweep);
@@ -165,8 +180,8 @@ SweepSettings read_sweep(const Section& section, double rate_hz) {
   sweep.bias_amplitude = section.number("bias_amplitude", zero_or_more, sweep.bias_amplitude);
   if (sweep.bias_amplitude > 0.0) sweep.bias_hz = read_frequency(section, "bias_hz", rate_hz);
   sweep.ramp_s = section.number("ramp_s", {.min = 0.0, .max = 3600.0}, sweep.ramp_s);
-  const std::string settling = section.choice("settling", {"detect", "fixed"});
-  sweep.settling = settling == "fixed" ? Settling::fixed : Settling::detect;
+  sweep.settling = read_settling(section, sweep);
+  sweep.probe_s = section.number("probe_s", {.min = -1.0, .max = 3600.0}, sweep.probe_s);
   if (sweep.settling == Settling::fixed) sweep.settle = default_fixed_wait;
   sweep.settle = read_span(section, "settle", sweep.settle, zero_or_more);
   sweep.settle_max = read_span(section, "settle_max", sweep.settle_max, zero_or_more);
@@ -293,6 +308,17 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
     if (rig.sensors[i].section.flag("readback", false)) rig.runner.readbacks.push_back(i);
   }
   rig.runner.responses = read_responses(sweep, rig.sensors);
+  rig.prior = sweep.text("prior", "");
+  if (rig.sweep.settling == Settling::model) {
+    for (const Pair& pair : rig.runner.responses) {
+      if (pair.exact_input) continue;
+      sweep.refuse("settling",
+                   "\"model\" needs responses to \"applied\": the transient of a measured input "
+                   "is not modelled; use \"detect\"");
+    }
+  } else if (!rig.prior.empty()) {
+    sweep.refuse("prior", "belongs to settling = \"model\"");
+  }
   rig.file = std::move(file);
   return rig;
 }

@@ -38,6 +38,7 @@ struct Rig {
   std::vector<Channel> sensors{};
   RunnerSettings runner{};
   double max_lag_s = 10.0;  // a finished point that is not on the disk for longer ends the run
+  std::string prior{};  // sweep file that the plant's modes are taken from; empty: they are found
 
   // The plan of this rig; PlanRefused becomes a ConfigError with file and line.
   SweepPlan plan() const;

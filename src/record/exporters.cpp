@@ -75,7 +75,8 @@ Json response_json(const StoredRun& run, const StoredResponse& response) {
                       {"dwell", point.dwell},
                       {"status", point.status},
                       {"reason", point.reason},
-                      {"reason_value", point.reason_value}});
+                      {"reason_value", point.reason_value},
+                      {"settled_by", point.settled_by}});
   }
   const ChannelInfo& input = run.channels.at(response.input);
   const ChannelInfo& output = run.channels.at(response.output);

@@ -67,6 +67,8 @@ CREATE TABLE point (            -- H = Y/U at one frequency, written when its dw
   status           TEXT NOT NULL, -- good unsettled low_signal clipped distorted rt_fault stopped
   reason           TEXT NOT NULL,
   reason_value     REAL,
+  settled_by       TEXT NOT NULL DEFAULT 'detection', -- how its transient was dealt with: wait,
+                                -- detection, model
   PRIMARY KEY (dwell, tone, response)
 ) WITHOUT ROWID;
 

@@ -24,6 +24,7 @@ StoredPoint stored_point(const Point& point) {
           .status = to_string(point.status),
           .reason = to_string(point.reason),
           .reason_value = point.reason_value,
+          .settled_by = to_string(point.settled_by),
           .more = {}};
 }
 

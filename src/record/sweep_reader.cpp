@@ -65,12 +65,14 @@ SweepPlan read_plan(Database& database, double rate_hz) {
 
 std::vector<StoredResponse> read_responses(Database& database) {
   std::vector<StoredResponse> responses;
+  const bool knows_settling = has_column(database, "point", "settled_by");
   Statement rows{
       database,
       "SELECT dwell, tone, input, output, freq_hz, re, im, var_re, cov_re_im, var_im, dof, "
       "gain_interval_db, phase_interval_deg, input_amplitude, output_amplitude, snr_db, "
-      "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value "
-      "FROM point ORDER BY response, freq_hz, dwell"};
+      "distortion, drift_per_s, samples, lost, seconds, status, reason, reason_value" +
+          std::string{knows_settling ? ", settled_by " : " "} +
+          "FROM point ORDER BY response, freq_hz, dwell"};
   while (rows.step()) {
     StoredPoint point{.dwell = whole<std::uint32_t>(rows, 0),
                       .tone = whole<std::uint32_t>(rows, 1),
@@ -93,6 +95,7 @@ std::vector<StoredResponse> read_responses(Database& database) {
                       .status = rows.text(21),
                       .reason = rows.text(22),
                       .reason_value = rows.number(23),
+                      .settled_by = knows_settling ? rows.text(24) : "",
                       .more = {}};
     const bool same_pair = !responses.empty() && responses.back().input == point.input &&
                            responses.back().output == point.output;

@@ -52,12 +52,12 @@ struct SweepWriter::Statements {
   explicit Statements(Database& database)
       : run{database, "INSERT OR REPLACE INTO run VALUES (?, ?)"},
         // A dwell that was stopped midway is replaced by its repetition, all at once.
-        point{database, "INSERT OR REPLACE INTO point VALUES (" + placeholders(25) + ")"},
+        point{database, "INSERT OR REPLACE INTO point VALUES (" + placeholders(26) + ")"},
         block{database, "INSERT INTO block VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)"},
         timing{database, "INSERT OR REPLACE INTO timing VALUES (" + placeholders(10) + ")"},
         event{database, "INSERT INTO event VALUES (NULL, ?, ?, ?, nullif(?, 0), ?, ?, ?)"},
         sample{database, "INSERT INTO sample VALUES (?, ?, ?)"},
-        lesson{database, "INSERT INTO lesson VALUES (" + placeholders(11) + ")"},
+        lesson{database, "INSERT OR REPLACE INTO lesson VALUES (" + placeholders(11) + ")"},
         durability{database, "INSERT OR REPLACE INTO durability VALUES (?, ?)"} {}
 
   Statement run;
@@ -247,7 +247,8 @@ void SweepWriter::insert(const Point& point) {
             point.covariance.re_im, point.covariance.im_im, point.dof, point.gain_interval_db,
             point.phase_interval_deg, point.input_amplitude, point.output_amplitude, point.snr_db,
             point.distortion, point.drift_per_s, point.samples, point.lost, point.seconds,
-            to_string(point.status), to_string(point.reason), point.reason_value)
+            to_string(point.status), to_string(point.reason), point.reason_value,
+            to_string(point.settled_by))
       .run();
 }
 
@@ -272,6 +273,10 @@ void SweepWriter::insert(const DwellTiming& timing) {
 }
 
 void SweepWriter::insert(const Event& event) {
+  if (event.kind == EventKind::remeasured) {
+    // What follows stands in place of what was.
+    Statement{*database_, "DELETE FROM block WHERE dwell = ?"}.bind(event.dwell).run();
+  }
   if (event.kind == EventKind::refined) write_dwell(event.dwell, candidates_.at(event.candidate));
   Trip trip = event.trip;
   trip.tick += start_.tick;

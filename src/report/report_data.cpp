@@ -215,6 +215,7 @@ Json point_columns(const std::vector<StoredPoint>& points) {
   json["samples"] = column(points, 8, [](const auto& p) { return p.samples; });
   json["status"] = texts(points, [](const auto& p) { return p.status; });
   json["reason"] = texts(points, [](const auto& p) { return p.reason; });
+  json["settled"] = texts(points, [](const auto& p) { return p.settled_by; });
   json["extra"] = more_json(points);
   return json;
 }

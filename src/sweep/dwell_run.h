@@ -54,6 +54,9 @@ class DwellRun {
   // The next begins.
   void end() noexcept { ticks_ = 0; }
 
+  // What it knows of the plant, beyond the dwell.
+  Measurement& measurement() noexcept { return measurement_; }
+
   std::size_t responses() const noexcept { return measurement_.pairs().size(); }
 
  private:

@@ -52,6 +52,18 @@ void Excitation::rest() noexcept {
   tones_ = 0;
   loudness_ = 0.0;
   run_ticks_ = 0;
+  handover_ = 0.0;
+  waveform_ = {};
+}
+
+void Excitation::start(std::span<const double> waveform, std::uint64_t ramp_samples) noexcept {
+  handover_ = tones();
+  ramp_samples_ = ramp_samples;
+  waveform_ = waveform;
+  tones_ = 0;
+  bins_ = 0;
+  elapsed_ = 0;
+  loudness_ = 0.0;
 }
 
 void Excitation::advance(std::uint64_t ticks) noexcept {
@@ -63,6 +75,8 @@ void Excitation::advance(std::uint64_t ticks) noexcept {
 }
 
 void Excitation::refresh() noexcept {
+  if (baseline_.oscillates()) oscillation_phasor_ = oscillation_.phasor();
+  if (tones_ == 0) return;
   for (std::size_t i = 0; i < tones_; ++i) phasors_[i] = voices_[i].phase.phasor();
   const Phasor tone = phasors_[0];
   const std::size_t harmonics_end = bins_ - (baseline_.oscillates() ? 1 : 0);
@@ -72,13 +86,16 @@ void Excitation::refresh() noexcept {
                 .sine = harmonic.sine * tone.cosine + harmonic.cosine * tone.sine};
     phasors_[i] = harmonic;
   }
-  if (baseline_.oscillates()) {
-    oscillation_phasor_ = oscillation_.phasor();
-    phasors_[harmonics_end] = oscillation_phasor_;
-  }
+  if (baseline_.oscillates()) phasors_[harmonics_end] = oscillation_phasor_;
 }
 
 double Excitation::tones() const noexcept {
+  if (tones_ == 0) {
+    const double value = elapsed_ < waveform_.size() ? waveform_[elapsed_] : 0.0;
+    if (elapsed_ >= ramp_samples_) return value;
+    return value +
+           handover_ * (1.0 - static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_));
+  }
   double sum = 0.0;
   for (std::size_t i = 0; i < tones_; ++i) {
     sum += voices_[i].in_phase * phasors_[i].sine + voices_[i].quadrature * phasors_[i].cosine;

@@ -28,6 +28,11 @@ class Excitation {
   // The command has been taken to neutral: the next dwell begins from there.
   void rest() noexcept SINERIG_NONBLOCKING;
 
+  // Begins a waveform laid on the baseline, one value per tick, zero beyond its end. Over the ramp
+  // the tones before fade out.
+  void start(std::span<const double> waveform,
+             std::uint64_t ramp_samples) noexcept SINERIG_NONBLOCKING;
+
   // Moves on by `ticks`.
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
 
@@ -72,6 +77,7 @@ class Excitation {
   double loudness_ = 0.0;  // largest amplitude of the running dwell
   double handover_ = 0.0;  // what the tones before stood above these at the start, of several tones
   double from_scale_ = 1.0;  // where the envelope begins, of the running dwell's amplitudes
+  std::span<const double> waveform_;
   bool closing_ = false;
   std::uint64_t closing_samples_ = 0;
   double closing_from_ = 0.0;

@@ -6,8 +6,6 @@
 #include <numbers>
 #include <utility>
 
-#include "sweep/student.h"
-
 namespace sinerig {
 
 namespace {
@@ -73,6 +71,10 @@ double angular_frequency(const Dwell& dwell, const Tone& tone, double rate_hz) {
   return per_cycle * static_cast<double>(tone.cycles);
 }
 
+// A modelled dwell is kept for this long. One that takes longer is limited by noise, not by its
+// transient: detection costs little there.
+constexpr std::size_t most_stored = std::size_t{1} << 19U;
+
 }  // namespace
 
 Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t max_tones,
@@ -88,7 +90,27 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
       estimates_(max_tones),
       strays_(max_tones),
       transients_(pairs_.size()),
-      omega_(max_bins) {}
+      omega_(max_bins) {
+  if (judgement_.settling != Settling::model) return;
+  std::vector<std::size_t> outputs;
+  for (const Pair& pair : pairs_) outputs.push_back(pair.output);
+  modal_ = std::make_unique<ModalSettling>(std::move(outputs), rate_hz);
+  store_ = std::make_unique<ModalStore>(channels, most_stored);
+  solver_ = make_solver(Deputy::Where::at_once);
+}
+
+std::unique_ptr<Deputy> Measurement::make_solver(Deputy::Where where) {
+  return std::make_unique<Deputy>([this] { verdict_ = modal_->look(*store_, look_count_); }, where);
+}
+
+void Measurement::solve_elsewhere() {
+  if (modal_) solver_ = make_solver(Deputy::Where::own_thread);
+}
+
+void Measurement::know(const ModePrior& prior, std::span<const double> noise_variance,
+                       double noise_dof) noexcept {
+  if (modal_) modal_->know(prior, noise_variance, noise_dof);
+}
 
 void Measurement::start(const Dwell& dwell) noexcept {
   dwell_ = &dwell;
@@ -118,6 +140,72 @@ void Measurement::restart() noexcept {
   whole_blocks_ = judgement_.settling == Settling::fixed;
   done_ = false;
   regression_.begin_block();
+  start_modal();
+}
+
+void Measurement::start_modal() noexcept {
+  by_model_ = false;
+  refuted_ = false;
+  modal_live_ = modal_ && modal_->knows() && dwell_->tones.size() == 1 && dwell_->bias_hz == 0.0;
+  if (!modal_live_) return;
+  waiting_ = !solver_->idle();
+  if (!waiting_) begin_modal();
+}
+
+void Measurement::begin_modal() noexcept {
+  waiting_ = false;
+  looking_ = false;
+  store_->clear();
+  blind_left_ = modal_->prior().blind_ticks;
+  const std::uint64_t before = dwell_->settle_samples + blind_left_;
+  modal_->start(
+      {.omega_rad_s = omega_[0],
+       .cycle_samples = dwell_->block_samples / dwell_->tones.front().cycles,
+       .least_samples = dwell_->least_samples > before ? dwell_->least_samples - before : 1,
+       .target_db = judgement_.target_db,
+       .target_deg = judgement_.target_deg});
+}
+
+void Measurement::add_modal(Phasor tone, std::span<const Observation> observations) noexcept {
+  if (waiting_ && solver_->idle()) begin_modal();
+  if (waiting_) return;
+  if (blind_left_ > 0) {
+    --blind_left_;
+    return;
+  }
+  store_->add(tone, observations);
+  if (looking_ && solver_->idle()) hear_verdict();
+  if (looking_ || !modal_live_) return;
+  if (store_->count() < modal_->next_look() && !store_->full()) return;
+  look_count_ = store_->count();
+  looking_ = true;
+  solver_->ask();
+  if (solver_->idle()) hear_verdict();
+}
+
+void Measurement::hear_verdict() noexcept {
+  looking_ = false;
+  if (verdict_ == ModalVerdict::going_on) return;
+  modal_live_ = false;
+  if (verdict_ == ModalVerdict::abandoned) {
+    refuted_ = modal_->doubt() == ModalDoubt::residual;
+    return;
+  }
+  take_modal();
+  done_ = true;
+}
+
+void Measurement::take_modal() noexcept {
+  by_model_ = true;
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    const ModalResult& from = modal_->result(pair);
+    Result& to = result(pair, 0);
+    to = {};
+    to.estimate = from.estimate;
+    to.variance = from.variance;
+    to.still = true;
+    to.known = from.known;
+  }
 }
 
 void Measurement::disturb() noexcept {
@@ -138,6 +226,7 @@ void Measurement::add(std::span<const Phasor> phasors,
   ++in_block_;
   // Part k of a block ends at the sample nearest below (k + 1) / parts of it.
   if (in_block_ * dwell_->parts >= (part_ + 1) * dwell_->block_samples) end_part();
+  if (modal_live_ && !done_) add_modal(phasors[0], observations);
 }
 
 void Measurement::end_part() noexcept {
@@ -257,23 +346,6 @@ bool Measurement::still(const Window& window) noexcept {
   return all;
 }
 
-Interval Measurement::interval(const Result& result, double scale) const noexcept {
-  const std::complex<double> response = result.estimate.response;
-  const double square = std::norm(response);
-  const Covariance2& c = result.variance.covariance;
-  const double re = response.real();
-  const double im = response.imag();
-  // Variances along and across H, relative to it.
-  const double along =
-      (re * re * c.re_re + 2.0 * re * im * c.re_im + im * im * c.im_im) / square / square;
-  const double across =
-      (im * im * c.re_re - 2.0 * re * im * c.re_im + re * re * c.im_im) / square / square;
-  const double t = student_t_975(result.variance.dof) * std::sqrt(scale);
-  const double left = result.left * result.left;
-  return {.gain_db = db_per_relative * std::sqrt(t * t * along + left),
-          .phase_deg = degrees_per_radian * std::sqrt(t * t * across + left)};
-}
-
 bool Measurement::target_met(std::size_t pair) const noexcept {
   if (!judgement_.has_target() || (pair > 0 && judgement_.target_of_first)) return true;
   for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
@@ -287,7 +359,7 @@ bool Measurement::target_met(std::size_t pair) const noexcept {
 }
 
 void Measurement::judge() noexcept {
-  if (samples_ < next_look_) return;
+  if (modal_live_ || samples_ < next_look_) return;
   Window window = current_window();
   const auto samples_of = [&] {
     return regression_.samples_at(window.last) - regression_.samples_at(window.first);
@@ -308,7 +380,7 @@ void Measurement::judge() noexcept {
   if (static_cast<double>(length) < window_per_wait * waited) return;
   if (!evaluate(0, window)) return;
   next_look_ = samples_ + length / looks_per_length;
-  if (judgement_.settling == Settling::detect && !still(window)) {
+  if (judgement_.settling != Settling::fixed && !still(window)) {
     first_ += (window.last - window.first + 3) / 4;
     return;
   }
@@ -323,6 +395,13 @@ void Measurement::judge() noexcept {
 
 void Measurement::conclude() noexcept {
   if (dwell_ == nullptr || done_) return;
+  if (modal_live_ && !waiting_ && solver_->idle()) {
+    modal_->conclude(*store_);
+    if (modal_->result(0).known) {
+      take_modal();
+      return;
+    }
+  }
   const Window window = current_window();
   if (window.last == window.first) return;
   taught_ = true;
@@ -385,6 +464,9 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   }
   const Interval half = interval(each);
   const double gain = std::abs(estimate.response);
+  point.settled_by = by_model_                                ? SettledBy::model
+                     : judgement_.settling == Settling::fixed ? SettledBy::wait
+                                                              : SettledBy::detection;
   point.response = estimate.response;
   point.covariance = each.variance.covariance;
   point.dof = each.variance.dof;

@@ -4,25 +4,23 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "sweep/deputy.h"
 #include "sweep/estimator.h"
+#include "sweep/modal_settling.h"
 #include "sweep/noise_memory.h"
 #include "sweep/nonblocking.h"
 #include "sweep/plan.h"
+#include "sweep/point_interval.h"
 #include "sweep/records.h"
 #include "sweep/regression.h"
 #include "sweep/transient_memory.h"
 
 namespace sinerig {
-
-// Half widths of the 95 % intervals of gain and phase.
-struct Interval {
-  double gain_db = 0.0;
-  double phase_deg = 0.0;
-};
 
 // A pair of regression channels (0 is what was applied, 1… the sensors) whose ratio is a response.
 // A dwell goes on until all have settled and, unless the target is of the first only, meet it.
@@ -33,6 +31,15 @@ class Measurement {
   // Takes all memory for dwells of up to `max_bins` bins.
   Measurement(std::size_t channels, std::size_t max_bins, std::size_t max_tones, Pairs pairs,
               Judgement judgement, double rate_hz);
+
+  // What is known of the plant's modes: from here on the transients of dwells are modelled, where
+  // the judgement wants that. `noise_variance` per pair.
+  void know(const ModePrior& prior, std::span<const double> noise_variance,
+            double noise_dof) noexcept SINERIG_NONBLOCKING;
+
+  // Solving for modes takes longer than a tick: where time is real, it is done on another thread.
+  // Before the loop begins.
+  void solve_elsewhere();
 
   void start(const Dwell& dwell) noexcept SINERIG_NONBLOCKING;
 
@@ -70,6 +77,17 @@ class Measurement {
   // lessons come in the order in which they were taught.
   void recall(const Lesson& lesson, const Dwell& dwell) noexcept;
 
+  // Of the dwell that has ended: the model of its transient ended it, or was abandoned because it
+  // left more than the noise.
+  bool modelled() const noexcept { return by_model_; }
+  bool model_refuted() const noexcept { return refuted_; }
+  const ModePrior& modes() const noexcept { return modal_->prior(); }
+  bool models() const noexcept { return modal_ && modal_->knows(); }
+  // From here on transients are waited for.
+  void stop_modelling() noexcept SINERIG_NONBLOCKING {
+    if (modal_) modal_->forget();
+  }
+
  private:
   struct Result {
     Estimate estimate{};
@@ -81,7 +99,15 @@ class Measurement {
   };
 
   void judge() noexcept;
-  Interval interval(const Result& result, double scale = 1.0) const noexcept;
+  Interval interval(const Result& result, double scale = 1.0) const noexcept {
+    return interval_of(result.estimate.response, result.variance, result.left, scale);
+  }
+  std::unique_ptr<Deputy> make_solver(Deputy::Where where);
+  void start_modal() noexcept;
+  void begin_modal() noexcept;
+  void hear_verdict() noexcept;
+  void add_modal(Phasor tone, std::span<const Observation> observations) noexcept;
+  void take_modal() noexcept;
   void restart() noexcept;
   void end_part() noexcept;
   Window current_window() noexcept;
@@ -109,6 +135,19 @@ class Measurement {
   std::vector<Stray> strays_;                // per tone
   std::vector<TransientMemory> transients_;  // per pair
   std::vector<double> omega_;                // per bin
+
+  // Where transients are modelled.
+  std::unique_ptr<ModalSettling> modal_;
+  std::unique_ptr<ModalStore> store_;
+  std::unique_ptr<Deputy> solver_;
+  std::uint64_t look_count_ = 0;  // samples that it is to look at
+  ModalVerdict verdict_ = ModalVerdict::going_on;
+  bool looking_ = false;     // it has been asked and not yet heard
+  bool waiting_ = false;     // it is busy with what has gone; this dwell begins when it is done
+  bool modal_live_ = false;  // this dwell is still the model's
+  bool by_model_ = false;    // … and it ended it
+  bool refuted_ = false;     // … and it left more than the noise
+  std::uint64_t blind_left_ = 0;
 
   const Dwell* dwell_ = nullptr;
   std::uint64_t samples_ = 0;  // since the start or the last disturbance

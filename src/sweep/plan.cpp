@@ -7,6 +7,7 @@
 
 #include "sweep/motion_check.h"
 #include "sweep/multitone.h"
+#include "sweep/probe.h"
 
 namespace sinerig {
 
@@ -21,6 +22,10 @@ constexpr double max_dwell_samples = 2.6e9;
 // would have more candidates.
 constexpr std::size_t finest_pieces = 64;
 constexpr std::size_t most_candidates = 20'000;
+
+// In cycles: a change of amplitude takes this long where the transient is modelled. Its slew is
+// held against the limits.
+constexpr double modelled_ramp = 1.0 / 16.0;
 
 // A candidate may follow any dwell: it always has the ramp of a change.
 const Dwell any_dwell{.tones = {{}, {}}};
@@ -115,16 +120,17 @@ Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Ton
            other.tones.front().amplitude == tones.front().amplitude;
   };
   const bool changes = before == nullptr ? tones.size() > 1 : !same_amplitude(*before);
-  const double ramp_samples =
-      std::ceil(std::max(sweep.ramp_s * rate_hz, changes ? samples_per_cycle / 2.0 : 0.0) - 1e-9);
+  const double least_ramp =
+      changes ? samples_per_cycle * (sweep.settling == Settling::model ? modelled_ramp : 0.5) : 0.0;
+  const double ramp_samples = std::ceil(std::max(sweep.ramp_s * rate_hz, least_ramp) - 1e-9);
   // A fixed wait is whole cycles, so that the reference phase is zero when measuring begins.
   const double settle_unit = sweep.settling == Settling::fixed ? base_samples : 1.0;
   const double settle_samples =
       settle_unit * (std::ceil(ramp_samples / settle_unit) + length(sweep.settle, settle_unit));
   const double blocks = std::max(1.0, length(sweep.integrate, block_samples));
-  const bool open_ended = sweep.has_target() || sweep.settling == Settling::detect;
+  const bool open_ended = sweep.has_target() || sweep.settling != Settling::fixed;
   double max_samples = settle_samples + blocks * block_samples;
-  if (sweep.settling == Settling::detect)
+  if (sweep.settling != Settling::fixed)
     max_samples += length(sweep.settle_max, block_samples) * block_samples;
   if (sweep.has_target()) max_samples += length(sweep.integrate_max, block_samples) * block_samples;
   if (max_samples > max_dwell_samples) {
@@ -142,6 +148,10 @@ Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Ton
   dwell.settle_samples = static_cast<std::uint64_t>(settle_samples);
   dwell.blocks = static_cast<std::uint32_t>(blocks);
   dwell.max_samples = static_cast<std::uint64_t>(max_samples);
+  if (sweep.settling == Settling::model) {
+    dwell.least_samples =
+        dwell.settle_samples + static_cast<std::uint64_t>(length(sweep.integrate, 1.0));
+  }
   dwell.harmonics = harmonic_count(sweep.harmonics, base, tones);
   for (Tone& tone : tones) tone.cycles *= static_cast<std::uint64_t>(bases);
   dwell.tones = std::move(tones);
@@ -265,13 +275,13 @@ Refinement make_refinement(const SweepPlan& plan, const SweepSettings& sweep,
 }  // namespace
 
 std::uint64_t SweepPlan::min_samples() const {
-  std::uint64_t sum = 0;
+  std::uint64_t sum = probe.command.size();
   for (const Dwell& dwell : dwells) sum += dwell.min_samples();
   return sum;
 }
 
 std::uint64_t SweepPlan::max_samples() const {
-  std::uint64_t sum = 0;
+  std::uint64_t sum = probe.command.size();
   for (const Dwell& dwell : dwells) sum += dwell.max_samples;
   return sum;
 }
@@ -328,6 +338,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
     check_ramp(dwell, before == nullptr ? 0.0 : before->tones.front().amplitude, limits, rate_hz);
     plan.dwells.push_back(std::move(dwell));
   }
+  plan.probe = make_probe(sweep, limits, rate_hz);
   if (sweep.refine_points > 0) plan.refinement = make_refinement(plan, sweep, limits);
   return plan;
 }

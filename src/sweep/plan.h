@@ -14,8 +14,9 @@ namespace sinerig {
 
 enum class Spacing { logarithmic, linear, list };
 
-// How the end of the transient is known: waited for, or seen.
-enum class Settling { fixed, detect };
+// How the end of the transient is known: waited for, or seen; or it is measured along, with the
+// plant's modes in the regression, and its end need not be known.
+enum class Settling { fixed, detect, model };
 
 struct AmplitudeBreak {
   double frequency_hz;
@@ -78,6 +79,7 @@ struct SweepSettings {
   double ramp_s = 0.0;
 
   Settling settling = Settling::detect;
+  double probe_s = -1.0;  // model: length of the first pass; negative: of its own, 0: none
   Span settle{.cycles = 0.0, .seconds = 0.0};           // waited for before anything is measured
   Span settle_max{.cycles = 20.0, .seconds = 20.0};     // detect: how long settling may take
   Span integrate{.cycles = 1.0, .seconds = 0.1};        // at least
@@ -122,8 +124,13 @@ struct Dwell {
   std::uint64_t settle_samples = 0;  // ramp included; waited for before anything is measured
   std::uint32_t blocks = 0;          // measured at least
   std::uint64_t max_samples = 0;     // of the whole dwell, wait included
+  // Of the whole dwell at least, where the transient is modelled: that needs no whole blocks. 0:
+  // all that min_samples() says.
+  std::uint64_t least_samples = 0;
 
-  std::uint64_t min_samples() const { return settle_samples + blocks * block_samples; }
+  std::uint64_t min_samples() const {
+    return least_samples > 0 ? least_samples : settle_samples + blocks * block_samples;
+  }
   double tone_hz(const Tone& tone, double rate_hz) const {
     return rate_hz * static_cast<double>(tone.cycles) / static_cast<double>(block_samples);
   }
@@ -162,10 +169,19 @@ struct Refinement {
   double tolerance_db = 0.5;
 };
 
+// What is played before the first dwell, on the baseline; see make_probe.
+struct Probe {
+  std::vector<double> command;      // per tick
+  std::uint64_t quiet_samples = 0;  // of them at rest before the waveform begins
+  double low_hz = 0.0;
+  double high_hz = 0.0;
+};
+
 struct SweepPlan {
   double rate_hz = 0.0;
   Baseline baseline{};
   Level level{};
+  Probe probe{};
   std::vector<Dwell> dwells;
   Refinement refinement{};
   Judgement judgement{};

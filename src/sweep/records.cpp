@@ -15,6 +15,15 @@ const char* to_string(PointStatus status) noexcept {
   return "unknown";
 }
 
+const char* to_string(SettledBy way) noexcept {
+  switch (way) {
+    case SettledBy::wait: return "wait";
+    case SettledBy::detection: return "detection";
+    case SettledBy::model: return "model";
+  }
+  return "unknown";
+}
+
 const char* to_string(PointReason reason) noexcept {
   switch (reason) {
     case PointReason::none: return "";
@@ -36,6 +45,9 @@ const char* to_string(PointReason reason) noexcept {
 const char* to_string(EventKind kind) noexcept {
   switch (kind) {
     case EventKind::started: return "started";
+    case EventKind::probed: return "probed";
+    case EventKind::model_doubted: return "model_doubted";
+    case EventKind::remeasured: return "remeasured";
     case EventKind::dwell_began: return "dwell_began";
     case EventKind::retried: return "retried";
     case EventKind::refined: return "refined";

@@ -53,6 +53,15 @@ enum class PointReason : std::uint8_t {
 
 const char* to_string(PointReason reason) noexcept;
 
+// How a point's transient was dealt with.
+enum class SettledBy : std::uint8_t {
+  wait,       // waited for a fixed time
+  detection,  // seen to go
+  model,      // regressed along
+};
+
+const char* to_string(SettledBy way) noexcept;
+
 // The result of a dwell for one tone and one pair of channels.
 struct Point {
   std::uint32_t dwell = 0;
@@ -62,6 +71,7 @@ struct Point {
   std::uint16_t output = first_sensor_channel;
   PointStatus status = PointStatus::good;
   PointReason reason = PointReason::none;
+  SettledBy settled_by = SettledBy::detection;
   double reason_value = 0.0;
   double frequency_hz = 0.0;
   std::complex<double> response{};
@@ -123,7 +133,10 @@ struct Lesson {
 
 enum class EventKind : std::uint8_t {
   started,
+  probed,  // the first pass has ended; value: modes found
   dwell_began,
+  model_doubted,   // value: what came of it: 0 confirmed, 1 replaced, 2 given up
+  remeasured,      // the dwell begins once more: its model turned out wrong
   retried,         // value: amplitude of the next try
   refined,         // a dwell was added; value: disagreement that called for it, dB; candidate
   gap,             // value: ticks skipped

@@ -32,6 +32,12 @@ RunnerSettings with_responses(RunnerSettings settings, std::size_t sensors) {
   return settings;
 }
 
+std::vector<std::size_t> outputs_of(const Pairs& pairs) {
+  std::vector<std::size_t> outputs;
+  for (const Pair& pair : pairs) outputs.push_back(pair.output);
+  return outputs;
+}
+
 class ReleaseOnExit {
  public:
   explicit ReleaseOnExit(Actuator& actuator) : actuator_{actuator} {}
@@ -61,9 +67,23 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
       leveller_{plan_.level},
       recovery_{settings_.retry, clock_, sink_, rearm},
       run_{plan_, settings_, sensors.size(), excitation_, guard_, sink_},
+      prober_{plan_.probe,
+              outputs_of(settings_.responses),
+              plan_.rate_hz,
+              settings_.finder,
+              !settings_.modes,
+              settings_.real_time ? Deputy::Where::own_thread : Deputy::Where::at_once},
+      trust_{dwells_.capacity()},
       observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
-      preflight_{settings_.preflight.wanted} {}
+      preflight_{settings_.preflight.wanted} {
+  Measurement& measurement = run_.measurement();
+  if (settings_.real_time) measurement.solve_elsewhere();
+  if (settings_.modes) {
+    measurement.know(settings_.modes->prior, settings_.modes->noise_variance,
+                     settings_.modes->noise_dof);
+  }
+}
 
 RunOutcome SweepRunner::run(RunControl& control) noexcept {
   announce({.kind = EventKind::started});
@@ -93,10 +113,13 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const std::uint64_t ticks = std::exchange(from_rest_, false) ? 1 : tick.index - last_tick_;
 
   const bool closing = dwell_ == dwells_.size();
-  const bool new_dwell = !closing && !run_.begun();
+  const bool probing = !closing && !preflight_ && prober_.running();
+  const bool new_dwell = !closing && !probing && !run_.begun();
   if (new_dwell) begin_dwell(tick.index + 1 - ticks);
-  excitation_.advance(new_dwell ? ticks - 1 : ticks);
-  run_.pass(tick, ticks);
+  const bool probe_begins = probing && prober_.begins();
+  if (probe_begins) excitation_.start(plan_.probe.command, plan_.probe.quiet_samples / 2);
+  excitation_.advance(new_dwell || probe_begins ? ticks - 1 : ticks);
+  if (!probing) run_.pass(tick, ticks);
   ++outcome_.ticks;
   last_tick_ = tick.index;
 
@@ -116,13 +139,18 @@ bool SweepRunner::step(RunControl& control) noexcept {
 
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
-    return guard_.trip().soft && !closing && pause(ticks);
+    return guard_.trip().soft && !closing && !probing && pause(ticks);
   }
   if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
-  run_.measure(tick.index, observations_, ticks > 1 || late || command_lost_ || command_late_);
-  if (run_.over()) conclude_dwell();
+  const bool disturbed = ticks > 1 || late || command_lost_ || command_late_;
+  if (probing) {
+    probe(disturbed);
+  } else {
+    run_.measure(tick.index, observations_, disturbed);
+    if (run_.over()) conclude_dwell();
+  }
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
   return keep_going();
 }

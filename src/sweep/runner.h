@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -10,8 +11,11 @@
 #include "sweep/dwell_run.h"
 #include "sweep/excitation.h"
 #include "sweep/guard.h"
+#include "sweep/known_modes.h"
 #include "sweep/leveller.h"
+#include "sweep/model_trust.h"
 #include "sweep/plan.h"
+#include "sweep/probe.h"
 #include "sweep/records.h"
 #include "sweep/recovery.h"
 #include "sweep/refiner.h"
@@ -61,6 +65,7 @@ class SweepRunner {
   bool step(RunControl& control) noexcept SINERIG_NONBLOCKING;
   void exchange(double command, const Tick& tick) noexcept SINERIG_NONBLOCKING;
   bool applied_late(std::int64_t offset_ns) noexcept SINERIG_NONBLOCKING;
+  void probe(bool disturbed) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
   bool under_way() const noexcept { return dwell_ < dwells_.size() && run_.begun(); }
   bool keep_going() noexcept;
@@ -68,6 +73,7 @@ class SweepRunner {
   bool recover(RunControl& control) noexcept;
   void conclude_dwell() noexcept;
   bool pass_preflight() noexcept;
+  void judge_model() noexcept;
   bool try_again() noexcept;
   void repeat_dwell() noexcept;
   void tell_trip(EventKind kind) noexcept;
@@ -94,6 +100,9 @@ class SweepRunner {
   Leveller leveller_;
   Recovery recovery_;
   DwellRun run_;
+  Prober prober_;
+  ModelTrust trust_;
+  bool remeasuring_ = false;               // what was modelled with modes that turned out wrong
   std::vector<Observation> observations_;  // applied, sensors: this tick
   double command_ = 0.0;                   // this tick
   std::vector<Fault> sensor_faults_;       // of the last tick

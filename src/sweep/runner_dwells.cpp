@@ -134,7 +134,43 @@ void SweepRunner::conclude_dwell() noexcept {
   }
   if (try_again()) return;
   finish_dwell();
-  next_dwell();
+  const Measurement& measurement = run_.measurement();
+  trust_.dwell_ended(dwell_, measurement.modelled(), measurement.model_refuted());
+  if (!trust_.doubted()) {
+    next_dwell();
+    return;
+  }
+  prober_.again();
+  if (!prober_.running()) judge_model();  // nobody can find them
+}
+
+// The first pass, in which the modes are found.
+void SweepRunner::probe(bool disturbed) noexcept {
+  prober_.add(observations_, disturbed);
+  if (!prober_.running()) judge_model();
+}
+
+// What the probe found is used from here on.
+void SweepRunner::judge_model() noexcept {
+  Measurement& measurement = run_.measurement();
+  const KnownModes* found = prober_.found();
+  const bool doubted = trust_.doubted();
+  bool use = found != nullptr;
+  if (doubted) {
+    const ModelTrust::Judgement judgement = trust_.probed(found, measurement.modes());
+    announce({.kind = EventKind::model_doubted,
+              .dwell = dwell_,
+              .tick = last_tick_,
+              .value = static_cast<double>(judgement)});
+    if (judgement == ModelTrust::Judgement::given_up) measurement.stop_modelling();
+    use = judgement == ModelTrust::Judgement::replaced;
+  }
+  if (use) measurement.know(found->prior, found->noise_variance, found->noise_dof);
+  announce({.kind = EventKind::probed,
+            .dwell = dwell_,
+            .tick = last_tick_,
+            .value = found != nullptr ? static_cast<double>(found->prior.modes) : 0.0});
+  if (doubted) next_dwell();
 }
 
 // Every response is told of; the first that fails trips the guard.
@@ -159,13 +195,23 @@ void SweepRunner::repeat_dwell() noexcept {
   run_.end();
 }
 
+// The plan, then what refinement adds, then what has to be measured again because the modes that
+// its transients were modelled with turned out wrong.
 void SweepRunner::next_dwell() noexcept {
   attempt_ = 0;
   scale_chosen_ = false;
   recovery_.next_dwell();
-  ++dwell_;
   ++outcome_.dwells_done;
-  if (dwell_ == dwells_.size()) refine();
+  if (!remeasuring_) {
+    ++dwell_;
+    if (dwell_ == dwells_.size()) refine();
+    remeasuring_ = dwell_ == dwells_.size();
+  }
+  if (!remeasuring_) return;
+  dwell_ = std::min(trust_.next_condemned(0), static_cast<std::uint32_t>(dwells_.size()));
+  if (dwell_ == dwells_.size()) return;
+  trust_.acquit(dwell_);
+  announce({.kind = EventKind::remeasured, .dwell = dwell_, .tick = last_tick_});
 }
 
 // One more dwell where the response between two points is not known.

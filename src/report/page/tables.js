@@ -19,7 +19,8 @@ function writeHead() {
 
 function statusText(r, i) {
   const reason = r.reason[i] ? ', ' + r.reason[i].replace(/_/g, ' ') : '';
-  return `<span class="status-${plain(r.status[i]) ? 'good' : 'other'}">${esc(r.status[i].replace(/_/g, ' ') + reason)}</span>`;
+  const way = r.settled && r.settled[i] === 'model' ? ', transient modelled' : '';
+  return `<span class="status-${plain(r.status[i]) ? 'good' : 'other'}">${esc(r.status[i].replace(/_/g, ' ') + reason + way)}</span>`;
 }
 
 function readoutRow(r) {

@@ -1,0 +1,54 @@
+// Whether the modes that transients are modelled with are still believed. A wrong order shows in
+// many dwells as more residual than the noise explains, though not in all: what the others gave is
+// measured again.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "sweep/known_modes.h"
+#include "sweep/nonblocking.h"
+
+namespace sinerig {
+
+class ModelTrust {
+ public:
+  // Of a sweep of up to `dwells` dwells.
+  explicit ModelTrust(std::size_t dwells);
+
+  // A dwell has ended: its transient was modelled, or its model was abandoned for its residual, or
+  // neither.
+  void dwell_ended(std::uint32_t dwell, bool modelled, bool abandoned) noexcept SINERIG_NONBLOCKING;
+
+  // So many of the last dwells were abandoned that the modes have to be found anew.
+  bool doubted() const noexcept { return doubted_; }
+
+  // What a new probe says of the modes in use.
+  enum class Judgement : std::uint8_t {
+    confirmed,  // they are those that were found again
+    replaced,   // the new ones are to be used; what was modelled so far is measured again
+    given_up,   // no modes hold: every transient is to be waited for, modelled points included
+  };
+  Judgement probed(const KnownModes* found, const ModePrior& used) noexcept SINERIG_NONBLOCKING;
+
+  // Points of this dwell were modelled with modes that turned out wrong.
+  bool condemned(std::uint32_t dwell) const noexcept { return condemned_[dwell] != 0; }
+  // The next dwell to measure again at or after this one; `dwells` where there is none.
+  std::uint32_t next_condemned(std::uint32_t from) const noexcept;
+  void condemn(std::uint32_t dwell) noexcept { condemned_[dwell] = 1; }
+  void acquit(std::uint32_t dwell) noexcept { condemned_[dwell] = 0; }
+
+ private:
+  std::vector<std::uint8_t> modelled_;
+  std::vector<std::uint8_t> condemned_;
+  std::uint32_t recent_ = 0;  // a bit per dwell, the last in the lowest: abandoned
+  int probes_ = 0;
+  int replacements_ = 0;
+  bool doubted_ = false;
+};
+
+// Whether two sets of modes are the same within what is known of them. Real poles that are hardly
+// known, fast ones that matter for a few ticks, may be in one of them only.
+bool same_modes(const ModePrior& one, const ModePrior& other) noexcept SINERIG_NONBLOCKING;
+
+}  // namespace sinerig
