@@ -67,8 +67,7 @@ TEST_F(Resume, CompletesARunThatWasStoppedByASignal) {
   EXPECT_EQ(stored.fact("outcome"), "done");
   EXPECT_EQ(stored.fact("started_utc"), first.fact("started_utc"));
   ASSERT_EQ(stored.responses.at(0).points.size(), 3U);
-  EXPECT_EQ(stored.responses[0].points.back().samples,
-            first.responses.at(0).points.back().samples);
+  EXPECT_EQ(stored.responses[0].points.back().samples, first.responses.at(0).points.back().samples);
   // A busy machine may spoil a point in real time; none is still the stopped one.
   for (const auto& point : stored.responses[0].points) EXPECT_NE(point.status, "stopped");
   EXPECT_TRUE(fs::exists(path("rig.html")));
