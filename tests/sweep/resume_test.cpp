@@ -104,7 +104,8 @@ TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   const Measured rest = run_from(plan, 0.01, first_of(whole, 8, 8));
   const auto amplitude_of = [](const Measured& run) {
     for (const Block& block : run.sink.blocks) {
-      if (block.dwell == 8 && block.channel == applied_channel) return std::abs(block.coefficients.phasor());
+      if (block.dwell == 8 && block.channel == applied_channel)
+        return std::abs(block.coefficients.phasor());
     }
     return 0.0;
   };
