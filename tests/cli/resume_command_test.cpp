@@ -67,8 +67,7 @@ TEST_F(Resume, CompletesARunThatWasStoppedByASignal) {
   EXPECT_EQ(stored.fact("outcome"), "done");
   EXPECT_EQ(stored.fact("started_utc"), first.fact("started_utc"));
   ASSERT_EQ(stored.responses.at(0).points.size(), 3U);
-  EXPECT_EQ(stored.responses[0].points.back().samples,
-            first.responses.at(0).points.back().samples);
+  EXPECT_EQ(stored.responses[0].points.back().samples, first.responses.at(0).points.back().samples);
   // A busy machine may spoil a point in real time; none is still the stopped one.
   for (const auto& point : stored.responses[0].points) EXPECT_NE(point.status, "stopped");
   EXPECT_TRUE(fs::exists(path("rig.html")));
@@ -97,7 +96,7 @@ TEST_F(Resume, RefusesWhatIsNoUnfinishedRun) {
 }
 
 TEST_F(Resume, RefusesAFileInUseAndRunNamesItself) {
-  write("rig.toml", rig("clock = \"monotonic\"", "4000"));
+  write("rig.toml", rig("clock = \"monotonic\"", "100"));
   test::Program program{{"run", "rig.toml", "--json"}, folder_};
   program.read_line();
   program.read_line();  // a point: it runs
@@ -138,12 +137,12 @@ TEST_F(Resume, MarksAKilledPart) {
 
 TEST_F(Resume, ARunStoppedByALimitStopsThereAgain) {
   std::string text = rig("", "4");
-  text.replace(text.find("[sensor.y]\n"), 11, "[sensor.y]\nmax = 0.4\n");
+  text.replace(text.find("[sensor.y]\n"), 11, "[sensor.y]\nmax = 0.2\n");
   write("rig.toml", text);
   EXPECT_EQ(run({"run", "rig.toml"}).code, 3);
   const auto resumed = run({"resume", "rig.sweep"});
   EXPECT_EQ(resumed.code, 3);
-  EXPECT_THAT(resumed.err, HasSubstr("is outside its limit 0.4"));
+  EXPECT_THAT(resumed.err, HasSubstr("is outside its limit 0.2"));
   const auto stored = record::read_sweep(path("rig.sweep"));
   ASSERT_EQ(stored.parts.size(), 2U);
   EXPECT_EQ(stored.parts[0].outcome, "stopped");
@@ -153,7 +152,7 @@ TEST_F(Resume, ARunStoppedByALimitStopsThereAgain) {
 
 TEST_F(Resume, AFullDiskStopsTheRunAndTheFileSaysWhy) {
   write("rig.toml", rig("", "4"));
-  const auto stopped = faulty("full=150000", "run rig.toml -o run.sweep --quiet");
+  const auto stopped = faulty("full=100000", "run rig.toml -o run.sweep --quiet");
   EXPECT_EQ(stopped.code, 3) << stopped.err;
   EXPECT_THAT(stopped.err, HasSubstr("database or disk is full"));
   const auto stored = record::read_sweep(path("run.sweep"));

@@ -53,7 +53,8 @@ for transport in tcp rtu; do
   sweep_with $transport 'drop_at_s = 2.0' 0 'done'
 done
 sweep_with tcp 'power_cycle_at_s = 2.0' 3 'connection lost'
-sweep_with rtu 'power_cycle_at_s = 2.0' 3 'no answer in time'
+# Whether the line is gone first or an answer is missed is a matter of microseconds.
+sweep_with rtu 'power_cycle_at_s = 2.0' 3 '/line: '
 # Armed again, the same power cut costs a repeated point; an error that stays, five tries.
 printf '\n[retry]\nfaults = 5\nwait_s = 1\n' >>"$out/tcp.toml"
 sweep_with tcp 'power_cycle_at_s = 2.0' 0 'device_fault: 127.0.0.1:5020: connection lost'
