@@ -34,7 +34,7 @@ struct StoredPoint {
   std::string status;
   std::string reason;
   double reason_value = 0.0;
-  std::string settled_by;              // wait, detection, model; empty where the file does not say
+  std::string settled_by{};            // wait, detection, model; empty where the file does not say
   std::map<std::string, double> more;  // columns that have no member above, by name
 };
 
