@@ -201,10 +201,8 @@ bool ModalSolver::solve(const ModalSums& sums, std::span<const ModePole> poles,
   gather(sums, belief, noise_variance);
   if (!solver_.factor(hessian_, columns_)) return false;
   solution.unknowns = static_cast<double>(tone_columns);
-  std::size_t index = 0;
   for (std::size_t i = 0; i < poles.size(); ++i) {
     if (visible_[i]) solution.unknowns += static_cast<double>(poles[i].size());
-    index += poles[i].size();
   }
   unit(1);
   solution.covariance.re_re = step_[1] / noise_variance;
