@@ -10,7 +10,6 @@
 
 #include <linux/capability.h>
 #include <sys/mman.h>
-#include <sys/resource.h>
 
 #include "realtime/remedies.h"
 
@@ -32,16 +31,6 @@ void touch(void* memory, std::size_t size) {
   for (std::size_t i = 0; i < size; i += page) bytes[i] = 1;
 }
 
-// The hard limit is ours to use.
-rlim_t raise_limit_of_locked_memory() {
-  rlimit limit{};
-  getrlimit(RLIMIT_MEMLOCK, &limit);
-  limit.rlim_cur = limit.rlim_max;
-  setrlimit(RLIMIT_MEMLOCK, &limit);
-  getrlimit(RLIMIT_MEMLOCK, &limit);
-  return limit.rlim_cur;
-}
-
 }  // namespace
 
 ProcessRights::ProcessRights() {
@@ -57,7 +46,7 @@ ProcessRights::~ProcessRights() {
 
 // Under a limit, what is taken later would no longer fit and fail: all or nothing.
 Grant ProcessRights::lock_memory() {
-  const rlim_t limit = raise_limit_of_locked_memory();
+  const rlim_t limit = raise_soft_limit(RLIMIT_MEMLOCK);
   Grant grant{.right = Right::memory, .state = {}, .remedy = {}};
   if (limit != RLIM_INFINITY && !has_capability(CAP_IPC_LOCK)) {
     grant.state = "cannot be locked: the limit of locked memory (RLIMIT_MEMLOCK) is " +

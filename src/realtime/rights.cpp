@@ -33,4 +33,13 @@ std::string describe_missing(const Grants& grants, const std::string& indent) {
   return text;
 }
 
+rlim_t raise_soft_limit(int resource) {
+  rlimit limit{};
+  getrlimit(resource, &limit);
+  limit.rlim_cur = limit.rlim_max;
+  setrlimit(resource, &limit);
+  getrlimit(resource, &limit);
+  return limit.rlim_cur;
+}
+
 }  // namespace sinerig::realtime

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include <sys/resource.h>
+
 namespace sinerig::realtime {
 
 // How the loop's thread is to run: [loop] priority and cpu of the rig file.
@@ -39,5 +41,9 @@ Grants missing(const Grants& grants);
 
 // "scheduling: SCHED_FIFO 80 was refused: …; REMEDY", one line for each that is missing.
 std::string describe_missing(const Grants& grants, const std::string& indent);
+
+// As far as it may be raised, the hard limit, which is ours to use: what it is then. `resource` is
+// an RLIMIT_… of <sys/resource.h>.
+rlim_t raise_soft_limit(int resource);
 
 }  // namespace sinerig::realtime

@@ -7,7 +7,6 @@
 
 #include <linux/capability.h>
 #include <sys/prctl.h>
-#include <sys/resource.h>
 
 #include "realtime/remedies.h"
 
@@ -23,19 +22,9 @@ constexpr std::size_t stack_reserve = std::size_t{256} << 10U;
   for (std::size_t i = 0; i < sizeof reserve; i += 1024) reserve[i] = 1;
 }
 
-// The hard limit is ours to use.
-rlim_t raise_limit_of_priority() {
-  rlimit limit{};
-  getrlimit(RLIMIT_RTPRIO, &limit);
-  limit.rlim_cur = limit.rlim_max;
-  setrlimit(RLIMIT_RTPRIO, &limit);
-  getrlimit(RLIMIT_RTPRIO, &limit);
-  return limit.rlim_cur;
-}
-
 Grant ask_for_priority(int priority) {
   Grant grant{.right = Right::scheduling, .state = {}, .remedy = {}};
-  const rlim_t limit = raise_limit_of_priority();
+  const rlim_t limit = raise_soft_limit(RLIMIT_RTPRIO);
   const sched_param wanted{.sched_priority = priority};
   grant.granted = sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &wanted) == 0;
   if (grant.granted) {

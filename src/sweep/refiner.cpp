@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace sinerig {
 
@@ -69,11 +70,12 @@ Refiner::Refiner(const Refinement& refinement, double rate_hz, std::size_t max_p
   }
 }
 
-bool Refiner::add(double frequency_hz) noexcept {
-  if (count_ == frequencies_.size()) return false;
+void Refiner::add(double frequency_hz) noexcept {
+  adding_ = false;
+  if (count_ == frequencies_.size()) return;
   std::size_t at = 0;
   while (at < count_ && frequencies_[at] < frequency_hz) ++at;
-  if (at < count_ && frequencies_[at] == frequency_hz) return false;
+  if (at < count_ && frequencies_[at] == frequency_hz) return;
   const auto move_up = [&](auto begin) {
     std::move_backward(begin + static_cast<std::ptrdiff_t>(at),
                        begin + static_cast<std::ptrdiff_t>(count_),
@@ -88,10 +90,11 @@ bool Refiner::add(double frequency_hz) noexcept {
   frequencies_[at] = frequency_hz;
   newest_ = at;
   ++count_;
-  return true;
+  adding_ = true;
 }
 
 void Refiner::set(std::size_t response, std::complex<double> value, double variance) noexcept {
+  if (!adding_) return;
   this->value(response, newest_) = {
       .response = value,
       .variance = variance,
@@ -99,6 +102,7 @@ void Refiner::set(std::size_t response, std::complex<double> value, double varia
 }
 
 void Refiner::learn() noexcept {
+  if (!std::exchange(adding_, false)) return;
   const std::size_t first = newest_ >= 2 ? newest_ - 2 : 0;
   for (std::size_t gap = first; gap <= newest_ + 1 && gap + 1 < count_; ++gap) look(gap);
 }

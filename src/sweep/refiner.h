@@ -26,9 +26,9 @@ class Refiner {
   Refiner(const Refinement& refinement, double rate_hz, std::size_t max_points,
           std::size_t responses);
 
-  // Begins the point at `frequency_hz`; each response of it follows by set(). False where there is
-  // one already, or no room.
-  bool add(double frequency_hz) noexcept SINERIG_NONBLOCKING;
+  // Begins the point at `frequency_hz`; each response of it follows by set(). Where there is one
+  // already, or no room, what follows is ignored.
+  void add(double frequency_hz) noexcept SINERIG_NONBLOCKING;
   void set(std::size_t response, std::complex<double> value,
            double variance) noexcept SINERIG_NONBLOCKING;
   // All responses of the point are there.
@@ -79,6 +79,7 @@ class Refiner {
   std::size_t responses_;
   std::size_t count_ = 0;
   std::size_t newest_ = 0;
+  bool adding_ = false;
   std::vector<double> frequencies_;
   std::vector<Value> values_;
   std::vector<Gap> gaps_;

@@ -77,6 +77,7 @@ class SweepRunner {
   bool try_again() noexcept;
   void repeat_dwell() noexcept;
   void tell_trip(EventKind kind) noexcept;
+  void teach_refiner(const Point& point) noexcept SINERIG_NONBLOCKING;
   void finish_dwell() noexcept;
   void next_dwell() noexcept;
   void account_usage() noexcept SINERIG_NONBLOCKING;

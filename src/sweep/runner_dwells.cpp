@@ -91,15 +91,13 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
       run_.recall(*lesson, dwell);
     }
     for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
-      const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
+      refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
       for (; point != finished.points.end() && point->dwell == dwell_ && point->tone == tone;
            ++point) {
         if (point->pair == 0 && tone == 0) leveller_.accept(*point);
-        if (refining && point->status == PointStatus::good) {
-          refiner_.set(point->pair, point->response, point->covariance.mean_variance());
-        }
+        teach_refiner(*point);
       }
-      if (refining) refiner_.learn();
+      refiner_.learn();
     }
     ++dwell_;
     ++outcome_.dwells_done;
@@ -245,18 +243,21 @@ bool SweepRunner::try_again() noexcept {
   return true;
 }
 
+void SweepRunner::teach_refiner(const Point& point) noexcept {
+  if (point.status != PointStatus::good) return;
+  refiner_.set(point.pair, point.response, point.covariance.mean_variance());
+}
+
 void SweepRunner::finish_dwell() noexcept {
   const Dwell& dwell = *dwells_[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
-    const bool refining = refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
+    refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
     for (std::size_t pair = 0; pair < run_.responses(); ++pair) {
       const Point point = run_.point(pair, tone);
       sink_.put(point);
-      if (refining && point.status == PointStatus::good) {
-        refiner_.set(pair, point.response, point.covariance.mean_variance());
-      }
+      teach_refiner(point);
     }
-    if (refining) refiner_.learn();
+    refiner_.learn();
   }
   account_usage();
   sink_.put(run_.timing());
