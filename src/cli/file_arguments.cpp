@@ -1,6 +1,7 @@
 #include "cli/file_arguments.h"
 
 #include "cli/loop_arguments.h"
+#include "cli/run_arguments.h"
 
 namespace sinerig::cli {
 
@@ -91,13 +92,8 @@ CLI::App* add_compare(CLI::App& app, CompareOptions& options) {
                    "changes of a resonance or margin up to this part of it are none")
       ->check(CLI::NonNegativeNumber)
       ->capture_default_str();
-  CLI::Option* quiet = comparer->add_flag_callback(
-      "--quiet", [&options] { options.voice = Voice::quiet; },
-      "print nothing: the exit code tells");
-  comparer
-      ->add_flag_callback(
-          "--json", [&options] { options.voice = Voice::json; }, "print one JSON object")
-      ->excludes(quiet);
+  add_voice(*comparer, options.voice, "print nothing: the exit code tells",
+            "print one JSON object");
   return comparer;
 }
 

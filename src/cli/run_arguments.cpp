@@ -8,6 +8,8 @@ namespace sinerig::cli {
 
 namespace {
 
+constexpr const char* quiet_run = "print warnings and errors only";
+
 // How `run` and `resume` are watched.
 template <typename Options>
 void add_telling(CLI::App& command, Options& options) {
@@ -20,16 +22,20 @@ void add_telling(CLI::App& command, Options& options) {
       "show the run in a browser while it goes on, with a Stop button; --serve=ADDR:PORT "
       "for elsewhere (default " +
           address + ", for this machine only; port 0: any free one)");
-  CLI::Option* quiet = command.add_flag_callback(
-      "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");
-  command
-      .add_flag_callback(
-          "--json", [&options] { options.voice = Voice::json; },
-          "print one JSON object per line: plan, points, end")
-      ->excludes(quiet);
+  add_voice(command, options.voice, quiet_run,
+            "print one JSON object per line: plan, points, end");
 }
 
 }  // namespace
+
+void add_voice(CLI::App& command, Voice& voice, const std::string& quiet_help,
+               const std::string& json_help) {
+  CLI::Option* quiet = command.add_flag_callback(
+      "--quiet", [&voice] { voice = Voice::quiet; }, quiet_help);
+  command.add_flag_callback(
+             "--json", [&voice] { voice = Voice::json; }, json_help)
+      ->excludes(quiet);
+}
 
 CLI::App* add_plan(CLI::App& app, PlanOptions& options) {
   CLI::App* plan = app.add_subcommand(
@@ -94,13 +100,8 @@ CLI::App* add_night(CLI::App& app, NightOptions& options) {
       "Run the sweeps of a job file one after the other, and tell what changed between repeats. "
       "Called again after an interruption it goes on where it was");
   night->add_option("JOB", options.job, "job file (TOML)")->required();
-  CLI::Option* quiet = night->add_flag_callback(
-      "--quiet", [&options] { options.voice = Voice::quiet; }, "print warnings and errors only");
-  night
-      ->add_flag_callback(
-          "--json", [&options] { options.voice = Voice::json; },
-          "print one JSON object per line: sweep, plan, points, end, and at last the night")
-      ->excludes(quiet);
+  add_voice(*night, options.voice, quiet_run,
+            "print one JSON object per line: sweep, plan, points, end, and at last the night");
   return night;
 }
 

@@ -13,6 +13,8 @@
 
 namespace sinerig::dashboard {
 
+using report::rounded;
+
 namespace {
 
 Json event_row(std::uint64_t tick, std::uint32_t dwell, EventKind kind, const std::string& channel,
@@ -53,13 +55,6 @@ Json event_json(const Event& event, const record::StoredRun& run) {
 }
 
 }  // namespace
-
-Json rounded(double value, int digits) {
-  if (!std::isfinite(value)) return nullptr;
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return std::strtod(text, nullptr);
-}
 
 std::string text_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);

@@ -15,9 +15,6 @@ namespace sinerig::dashboard {
 
 using Json = nlohmann::ordered_json;
 
-// To so many significant digits; null where there is no number.
-Json rounded(double value, int digits);
-
 // One line; bytes that are no UTF-8 are replaced.
 std::string text_of(const Json& json);
 

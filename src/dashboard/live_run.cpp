@@ -13,6 +13,8 @@ namespace sinerig::dashboard {
 
 namespace {
 
+using report::rounded;
+
 // Entries in one message: some 100 kB.
 constexpr std::size_t most_in_message = 256;
 

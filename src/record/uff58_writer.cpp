@@ -1,9 +1,8 @@
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <ostream>
 
 #include "record/point_columns.h"
+#include "record/text.h"
 #include "record/uff58.h"
 
 namespace sinerig::record {
@@ -11,15 +10,6 @@ namespace sinerig::record {
 namespace {
 
 constexpr std::size_t abscissa_columns = 13;
-
-[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
-  char buffer[128];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
 
 // As many digits as fit beside one blank. FORTRAN takes a number with a decimal point as it stands,
 // whatever the digits of the E13.5 that reads it.

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <ostream>
 
 #include <nlohmann/json.hpp>
+
+#include "record/text.h"
 
 namespace sinerig::report {
 
@@ -14,15 +14,7 @@ namespace {
 
 using record::Difference;
 using record::PointDifference;
-
-[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
-  char buffer[256];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
+using record::text;
 
 std::string verdict(const Difference& difference) {
   std::string words =

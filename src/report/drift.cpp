@@ -2,28 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <ostream>
 
 #include <nlohmann/json.hpp>
+
+#include "record/text.h"
 
 namespace sinerig::report {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
+using record::text;
 
 constexpr double normal_975 = 1.959963984540054;
-
-[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
-  char buffer[256];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
 
 Json number(double value) {
   return std::isfinite(value) ? Json(value) : Json();

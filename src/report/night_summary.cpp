@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <ostream>
 
 #include <nlohmann/json.hpp>
 
+#include "record/text.h"
 #include "report/comparison.h"
 #include "report/terminal.h"
 
@@ -18,15 +17,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using record::Difference;
 using record::PointDifference;
-
-[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
-  char buffer[512];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
+using record::text;
 
 // The point that speaks most against no change.
 const PointDifference* least_likely(const Difference& difference) {

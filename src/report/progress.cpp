@@ -2,16 +2,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
 #include <numbers>
 #include <ostream>
 
+#include "record/text.h"
 #include "report/sparkline.h"
 #include "report/terminal.h"
 
 namespace sinerig::report {
 
 namespace {
+
+using record::text;
 
 constexpr std::chrono::milliseconds draw_interval{100};
 constexpr std::size_t least_columns = 80;
@@ -25,15 +27,6 @@ constexpr const char* green = "\033[32m";
 constexpr const char* yellow = "\033[33m";
 constexpr const char* blue = "\033[34m";
 constexpr const char* plain = "\033[0m";
-
-[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
-  char buffer[256];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
 
 double gain_db(const Point& point) {
   return 20.0 * std::log10(std::abs(point.response));

@@ -20,18 +20,10 @@ using record::StoredPoint;
 using record::StoredResponse;
 using record::StoredRun;
 
-// To so many significant digits; null where there is no number.
-Json number(double value, int digits) {
-  if (!std::isfinite(value)) return nullptr;
-  char text[40];
-  std::snprintf(text, sizeof text, "%.*g", digits, value);
-  return std::strtod(text, nullptr);
-}
-
 template <typename Value>
 Json column(const std::vector<StoredPoint>& points, int digits, Value value) {
   Json all = Json::array();
-  for (const StoredPoint& point : points) all.push_back(number(value(point), digits));
+  for (const StoredPoint& point : points) all.push_back(rounded(value(point), digits));
   return all;
 }
 
@@ -44,7 +36,7 @@ Json texts(const std::vector<StoredPoint>& points, Value value) {
 
 Json roots_json(const std::vector<std::complex<double>>& roots) {
   Json all = Json::array();
-  for (const auto& root : roots) all.push_back({number(root.real(), 9), number(root.imag(), 9)});
+  for (const auto& root : roots) all.push_back({rounded(root.real(), 9), rounded(root.imag(), 9)});
   return all;
 }
 
@@ -54,21 +46,21 @@ Json model_json(const record::StoredFit& fit, const StoredResponse& response) {
   std::vector<double> grid;
   for (const StoredPoint& point : response.points) grid.push_back(point.frequency_hz);
   for (const std::complex<double>& value : model_response(fit, grid)) {
-    model["at_re"].push_back(number(value.real(), 9));
-    model["at_im"].push_back(number(value.imag(), 9));
+    model["at_re"].push_back(rounded(value.real(), 9));
+    model["at_im"].push_back(rounded(value.imag(), 9));
   }
   for (const double each : curve_grid(fit, grid.front(), grid.back())) grid.push_back(each);
   std::sort(grid.begin(), grid.end());
   const std::vector<std::complex<double>> curve = model_response(fit, grid);
   const ModelBand band = model_band(fit, grid);
   for (std::size_t i = 0; i < grid.size(); ++i) {
-    model["f"].push_back(number(grid[i], 8));
-    model["re"].push_back(number(curve[i].real(), 7));
-    model["im"].push_back(number(curve[i].imag(), 7));
+    model["f"].push_back(rounded(grid[i], 8));
+    model["re"].push_back(rounded(curve[i].real(), 7));
+    model["im"].push_back(rounded(curve[i].imag(), 7));
   }
   model["gain95"] = model["phase95"] = Json::array();
-  for (const double each : band.gain) model["gain95"].push_back(number(each, 4));
-  for (const double each : band.phase_rad) model["phase95"].push_back(number(each, 4));
+  for (const double each : band.gain) model["gain95"].push_back(rounded(each, 4));
+  for (const double each : band.phase_rad) model["phase95"].push_back(rounded(each, 4));
   model["facts"] = fit.facts;
   model["poles"] = roots_json(fit.poles);
   model["zeros"] = roots_json(fit.zeros);
@@ -88,7 +80,7 @@ Json choe_json(const StoredRun& run, const StoredResponse& response) {
   if (fit == nullptr) return nullptr;
   const record::StoredChoe& choe = *fit->choe;
   Json json{{"f", Json::array()}, {"bands", Json::array()}};
-  for (const double each : choe.freq_hz) json["f"].push_back(number(each, 8));
+  for (const double each : choe.freq_hz) json["f"].push_back(rounded(each, 8));
   for (std::size_t k = 0; k < choe.bands.size(); ++k) {
     const auto& band = choe.bands[k];
     const identify::TransferFunction model{.num = band.num, .den = band.den};
@@ -96,17 +88,17 @@ Json choe_json(const StoredRun& run, const StoredResponse& response) {
     Json additive = Json::array();
     for (std::size_t i = 0; i < choe.freq_hz.size(); ++i) {
       const double omega = 2.0 * std::numbers::pi * choe.freq_hz[i];
-      gain.push_back(number(std::abs(model.at(omega)), 7));
-      additive.push_back(number(choe.additive[k][i], 7));
+      gain.push_back(rounded(std::abs(model.at(omega)), 7));
+      additive.push_back(rounded(choe.additive[k][i], 7));
     }
-    json["bands"].push_back({{"low_hz", number(band.low_hz, 8)},
-                             {"high_hz", number(band.high_hz, 8)},
+    json["bands"].push_back({{"low_hz", rounded(band.low_hz, 8)},
+                             {"high_hz", rounded(band.high_hz, 8)},
                              {"gain", gain},
                              {"additive", additive}});
   }
   json["nominal"] = json["weight"] = Json::array();
-  for (const auto& each : choe.nominal) json["nominal"].push_back(number(std::abs(each), 7));
-  for (const double each : choe.weight) json["weight"].push_back(number(each, 7));
+  for (const auto& each : choe.nominal) json["nominal"].push_back(rounded(std::abs(each), 7));
+  for (const double each : choe.weight) json["weight"].push_back(rounded(each, 7));
   return json;
 }
 
@@ -128,7 +120,7 @@ Json more_json(const std::vector<StoredPoint>& points) {
       return std::isfinite(value) && value != 0.0;
     });
     if (empty) continue;
-    for (const double value : values) more[name].push_back(number(value, 6));
+    for (const double value : values) more[name].push_back(rounded(value, 6));
   }
   return more;
 }
@@ -153,7 +145,7 @@ Json difference_json(const record::Difference& difference) {
   const auto add = [&](const char* key, int digits, auto value) {
     json[key] = Json::array();
     for (const record::PointDifference& point : difference.points)
-      json[key].push_back(number(value(point), digits));
+      json[key].push_back(rounded(value(point), digits));
   };
   add("f", 9, [](const auto& p) { return p.frequency_hz; });
   add("gain_db", 7, [](const auto& p) { return p.gain_db; });
@@ -180,6 +172,13 @@ const std::vector<std::string>& notes() {
 }
 
 }  // namespace
+
+Json rounded(double value, int digits) {
+  if (!std::isfinite(value)) return nullptr;
+  char text[40];
+  std::snprintf(text, sizeof text, "%.*g", digits, value);
+  return std::strtod(text, nullptr);
+}
 
 std::string response_name(const StoredRun& run, const StoredResponse& response) {
   const std::string& output = run.channels.at(response.output).name;

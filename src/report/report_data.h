@@ -17,6 +17,9 @@ struct LabelledRun {
   record::StoredRun run;
 };
 
+// A number to so many significant digits; null where there is none.
+nlohmann::ordered_json rounded(double value, int digits);
+
 // "encoder", or "gyro / encoder" where the input is not what was applied.
 std::string response_name(const record::StoredRun& run, const record::StoredResponse& response);
 

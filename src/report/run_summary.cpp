@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
 
 #include "record/confidence.h"
+#include "record/text.h"
 #include "report/report_data.h"
 #include "report/run_parts.h"
 #include "report/terminal.h"
@@ -19,15 +19,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using record::StoredPoint;
 using record::StoredRun;
-
-[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
-  char buffer[256];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
+using record::text;
 
 Json points_fact(const std::vector<StoredPoint>& points) {
   const auto good = std::count_if(points.begin(), points.end(), [](const StoredPoint& point) {

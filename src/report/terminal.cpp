@@ -2,27 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
 #include <numbers>
 #include <ostream>
 #include <utility>
 
+#include "record/text.h"
 #include "report/run_parts.h"
 
 namespace sinerig::report {
 
 namespace {
 
-constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
+using record::text;
 
-[[gnu::format(printf, 1, 2)]] std::string text(const char* format, ...) {
-  char buffer[512];
-  va_list arguments;
-  va_start(arguments, format);
-  std::vsnprintf(buffer, sizeof buffer, format, arguments);
-  va_end(arguments);
-  return buffer;
-}
+constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
 
 double seconds_of(std::uint64_t samples, double rate_hz) {
   return static_cast<double>(samples) / rate_hz;
