@@ -19,6 +19,7 @@ struct CompletedCommand {
   std::string name;
   std::string description;
   std::string files;  // extensions that its positional takes, separated by |; empty: none
+  std::vector<std::string> words;  // that its positional takes
   std::vector<CompletedOption> options;
 };
 
@@ -58,21 +59,29 @@ std::vector<CompletedOption> options_of(const CLI::App& app) {
   return options;
 }
 
-std::string files_of(const CLI::App& app) {
+// The first positional of a command, which is all that any has; null where it has none.
+const CLI::Option* positional_of(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options()) {
-    if (!option->get_positional()) continue;
-    if (option->get_name(true) == "RIG") return "toml";
-    return "sweep|csv|txt|mat|uff|unv";
+    if (option->get_positional()) return option;
   }
-  return "";
+  return nullptr;
+}
+
+std::string files_of(const CLI::Option* positional) {
+  if (positional == nullptr || !values_of(*positional).empty()) return "";
+  const std::string name = positional->get_name(true);
+  return name == "RIG" || name == "JOB" ? "toml" : "sweep|csv|txt|mat|uff|unv";
 }
 
 std::vector<CompletedCommand> commands_of(const CLI::App& app) {
   std::vector<CompletedCommand> commands;
   for (const CLI::App* each : app.get_subcommands([](const CLI::App*) { return true; })) {
+    const CLI::Option* positional = positional_of(*each);
     CompletedCommand command{.name = each->get_name(),
                              .description = each->get_description(),
-                             .files = files_of(*each),
+                             .files = files_of(positional),
+                             .words = positional == nullptr ? std::vector<std::string>{}
+                                                            : values_of(*positional),
                              .options = options_of(*each)};
     for (CompletedOption& option : options_of(app)) {
       const std::string& name = option.names.back();
@@ -111,7 +120,7 @@ void write_bash(std::ostream& stream, const std::vector<CompletedCommand>& comma
   stream << "# bash completion for sinerig: sinerig completion bash\n"
             "_sinerig() {\n"
             "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD-1]} command= i\n"
-            "  local options= files=\n"
+            "  local options= files= words=\n"
             "  COMPREPLY=()\n"
             "  for ((i = 1; i < COMP_CWORD; ++i)); do\n"
             "    case ${COMP_WORDS[i]} in -*) ;; *) command=${COMP_WORDS[i]}; break ;; esac\n"
@@ -134,11 +143,13 @@ void write_bash(std::ostream& stream, const std::vector<CompletedCommand>& comma
       }
     }
     stream << "      esac\n      options='" << joined(options, " ") << "' files='" << command.files
-           << "' ;;\n";
+           << "' words='" << joined(command.words, " ") << "' ;;\n";
   }
   stream << "  esac\n"
             "  if [[ $word == -* || -z $command ]]; then\n"
             "    COMPREPLY=($(compgen -W \"$options\" -- \"$word\"))\n"
+            "  elif [ -n \"$words\" ]; then\n"
+            "    COMPREPLY=($(compgen -W \"$words\" -- \"$word\"))\n"
             "  elif [ -n \"$files\" ]; then\n"
             "    local file\n"
             "    while IFS= read -r file; do\n"
@@ -178,6 +189,8 @@ void write_zsh(std::ostream& stream, const std::vector<CompletedCommand>& comman
     }
     if (!command.files.empty())
       stream << " \\\n            '*:file:_files -g \"*.(" << command.files << ")\"'";
+    if (!command.words.empty())
+      stream << " \\\n            '1:word:(" << quoted(joined(command.words, " ")) << ")'";
     stream << " ;;\n";
   }
   stream
@@ -194,6 +207,8 @@ void write_fish(std::ostream& stream, const std::vector<CompletedCommand>& comma
         "complete -c sinerig -n '__fish_seen_subcommand_from " + command.name + "'";
     for (const std::string& extension : split(command.files, '|'))
       stream << when << " -a '(__fish_complete_suffix ." << extension << ")'\n";
+    if (!command.words.empty())
+      stream << when << " -a '" << quoted(joined(command.words, " ")) << "'\n";
     for (const CompletedOption& option : command.options) {
       stream << when;
       for (const std::string& name : option.names)

@@ -15,7 +15,8 @@ dashboard::LiveSetup setup_of(const config::Rig& rig, const SweepPlan& plan) {
   dashboard::LiveSetup setup{.label = std::filesystem::path{rig.file->name()}.stem().string(),
                              .run = {},
                              .limits = rig.guard,
-                             .in_real_time = in_real_time};
+                             .in_real_time = in_real_time,
+                             .preflight = rig.runner.preflight.wanted};
   record::StoredRun& run = setup.run;
   run.facts = {{"rig_name", rig.file->name()},
                {"rig_text", rig.file->text()},

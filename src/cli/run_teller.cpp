@@ -78,7 +78,7 @@ void RunTeller::point(const Point& point) {
             {"dwell", point.dwell},
             {"output", channel(point.output)},
             {"input", channel(point.input)}};
-  const Json columns = report::point_columns({record::stored_point(point)});
+  const Json columns = report::point_columns({record::stored_point(point, plan_.rate_hz)});
   for (const auto& [name, column] : columns.items()) {
     if (name != "extra") line[name == "f" ? "freq_hz" : name] = column.at(0);
   }

@@ -74,6 +74,8 @@ Json head_json(const std::string& label, const record::StoredRun& run, bool in_r
   }
   page["range"] = {rounded(low, 9), rounded(high, 9)};
   page["dwells"] = run.plan.dwells.size();
+  if (!run.plan.probe.command.empty())
+    page["probe"] = {rounded(run.plan.probe.low_hz, 4), rounded(run.plan.probe.high_hz, 4)};
   page["least_s"] = rounded(run.plan.min_seconds(), 6);
   page["most_s"] = rounded(run.plan.max_seconds(), 6);
   page["real_time"] = in_real_time;
@@ -86,7 +88,8 @@ Json head_json(const std::string& label, const record::StoredRun& run, bool in_r
   return page;
 }
 
-Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) {
+Json log_json(const std::vector<Record>& entries, const record::StoredRun& run,
+              const std::vector<Dwell>& added) {
   std::map<std::uint16_t, std::vector<record::StoredPoint>> points;
   std::vector<std::uint64_t> histogram(DwellTiming::bins);
   Json frequencies = Json::array();
@@ -96,12 +99,13 @@ Json log_json(const std::vector<Record>& entries, const record::StoredRun& run) 
   Json events = Json::array();
   for (const Record& entry : entries) {
     if (const auto* point = std::get_if<Point>(&entry)) {
-      points[point->pair].push_back(record::stored_point(*point));
+      points[point->pair].push_back(record::stored_point(*point, run.plan.rate_hz));
     } else if (const auto* timing = std::get_if<DwellTiming>(&entry)) {
-      // A dwell that a refinement added is not in the plan: its ticks count, it has no bar.
-      if (timing->dwell < run.plan.dwells.size()) {
-        frequencies.push_back(
-            rounded(run.plan.dwells[timing->dwell].frequency_hz(run.plan.rate_hz), 9));
+      const std::size_t planned = run.plan.dwells.size();
+      if (timing->dwell < planned + added.size()) {
+        const Dwell& dwell = timing->dwell < planned ? run.plan.dwells[timing->dwell]
+                                                     : added[timing->dwell - planned];
+        frequencies.push_back(rounded(dwell.frequency_hz(run.plan.rate_hz), 9));
         latest.push_back(rounded(1e-3 * static_cast<double>(timing->max_lateness_ns), 4));
         const ThreadUsage usage = timing->usage.value_or(ThreadUsage{});
         faults.push_back(usage.minor_faults + usage.major_faults);

@@ -22,8 +22,10 @@ std::string text_of(const Json& json);
 // `most_s`, `channels`, `pairs` (input and output channel of each response).
 Json head_json(const std::string& label, const record::StoredRun& run, bool in_real_time);
 
-// {responses: [{r, columns…}], timing: {f, late_us, histogram}, events}.
-Json log_json(const std::vector<Record>& entries, const record::StoredRun& run);
+// {responses: [{r, columns…}], timing: {f, late_us, histogram}, events}. `added`: the dwells that
+// follow those of the plan.
+Json log_json(const std::vector<Record>& entries, const record::StoredRun& run,
+              const std::vector<Dwell>& added);
 
 Json headroom_json(const std::vector<Headroom>& rows);
 Json trace_json(const Scope::Trace& trace);

@@ -13,6 +13,7 @@
 #include "dashboard/running_estimate.h"
 #include "dashboard/scope.h"
 #include "dashboard/watched_clock.h"
+#include "dashboard/whereabouts.h"
 #include "record/sweep_reader.h"
 #include "report/remaining_time.h"
 
@@ -26,6 +27,7 @@ struct LiveSetup {
   record::StoredRun run;  // facts, channels and plan; a StoredResponse without points per pair
   GuardSettings limits;
   bool in_real_time = true;
+  bool preflight = false;  // the sweep begins with one
 };
 
 struct Ending {
@@ -58,6 +60,7 @@ class LiveRun {
   struct Moment;
 
   Moment moment();
+  void begin_part();
 
   LiveSetup setup_;
   const Lateness& lateness_;
@@ -66,11 +69,9 @@ class LiveRun {
   std::mutex mutex_;  // guards what is below
   std::vector<Record> entries_;
   std::size_t events_ = 0;
-  std::uint32_t dwell_ = 0;
-  double level_ = 0.0;  // amplitude of the command asked for in the dwell under way
-  std::uint32_t retries_ = 0;
+  Whereabouts where_;
   Scope scope_;
-  std::vector<RunningEstimate> estimates_;  // per response
+  std::vector<std::vector<RunningEstimate>> estimates_;  // per response, per tone of the dwell
   report::RemainingTime time_;
   std::unique_ptr<Ending> ending_;
 

@@ -15,13 +15,8 @@ constexpr std::size_t most_blocks = 4096;
 
 }  // namespace
 
-void RunningEstimate::start() {
-  pairs_.clear();
-  attempt_ = 0;
-}
-
 void RunningEstimate::add(const Block& block) {
-  if (block.tone != 0 || (block.channel != input_ && block.channel != output_)) return;
+  if (block.tone != tone_ || (block.channel != input_ && block.channel != output_)) return;
   if (block.attempt != attempt_) {
     pairs_.clear();
     attempt_ = block.attempt;

@@ -12,11 +12,11 @@ namespace sinerig::dashboard {
 
 class RunningEstimate {
  public:
-  // Of the response `output` / `input`, as channels of the run.
-  RunningEstimate(std::uint16_t input, std::uint16_t output) : input_{input}, output_{output} {}
+  // Of the response `output` / `input`, as channels of the run, at one tone of the dwell.
+  RunningEstimate(std::uint16_t input, std::uint16_t output, std::uint16_t tone = 0)
+      : input_{input}, output_{output}, tone_{tone} {}
 
-  void start();
-  // Blocks of the first tone; a new attempt begins anew.
+  // A new attempt begins anew; blocks of other tones are passed over.
   void add(const Block& block);
 
   struct Value {
@@ -41,6 +41,7 @@ class RunningEstimate {
 
   std::uint16_t input_;
   std::uint16_t output_;
+  std::uint16_t tone_;
   std::uint32_t attempt_ = 0;
   std::vector<Pair> pairs_;
 };

@@ -11,7 +11,6 @@ namespace sinerig::record {
 
 namespace {
 
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 constexpr double frequency_tolerance = 1e-6;
 
 bool usable(const StoredPoint& point) {

@@ -11,8 +11,6 @@ namespace sinerig::record {
 
 namespace {
 
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-
 HalfWidth95 from_covariance(const StoredPoint& point) {
   const double re = point.response.real();
   const double im = point.response.imag();
@@ -44,6 +42,14 @@ double circular_variance(const StoredPoint& point) {
   const double t = student_t_975(point.dof);
   return 0.5 * (half.gain * half.gain + half.phase_rad * half.phase_rad) *
          std::norm(point.response) / (t * t);
+}
+
+double coherence(const StoredPoint& point, double rate_hz) {
+  if (!(point.dof > 0.0) || !(rate_hz > 0.0)) return nan_value;
+  const double cycles = point.samples * point.frequency_hz / rate_hz;
+  const double signal = std::norm(point.response);
+  const double noise = 2.0 * cycles * point.covariance.mean_variance();
+  return signal / (signal + noise);
 }
 
 }  // namespace sinerig::record

@@ -112,6 +112,7 @@ StoredPoint point_of(const Row& row) {
   }
   if (!row.text("status").empty()) point.status = row.text("status");
   point.reason = row.text("reason");
+  point.settled_by = row.text("settled_by");
   return point;
 }
 

@@ -1,5 +1,6 @@
 #include "record/exporters.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <ostream>
@@ -67,6 +68,7 @@ Json response_json(const StoredRun& run, const StoredResponse& response) {
                       {"input_amplitude", point.input_amplitude},
                       {"output_amplitude", point.output_amplitude},
                       {"snr_db", point.snr_db},
+                      {"coherence", point.coherence},
                       {"distortion", point.distortion},
                       {"drift_per_s", point.drift_per_s},
                       {"samples", point.samples},
@@ -136,6 +138,18 @@ Json timing_json(const StoredRun& run) {
   return timings;
 }
 
+// What the names of the columns leave open, as the last name: a line of its own would be a row, or
+// an error, to most programs that read CSV. No comma in it, which would end it.
+std::string legend(const ChannelInfo& input, const ChannelInfo& output) {
+  const auto unit = [](const ChannelInfo& channel) {
+    return channel.unit.empty() ? "1" : channel.unit;
+  };
+  std::string text = std::string{response_convention} + "; re and im in " + unit(output) + " per " +
+                     unit(input) + "; intervals are half widths of 95 %";
+  std::replace(text.begin(), text.end(), ',', ';');
+  return text;
+}
+
 }  // namespace
 
 void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse& response) {
@@ -143,7 +157,8 @@ void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse&
   const ChannelInfo& output = run.channels.at(response.output);
   stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im";
   for (const PointColumn& column : point_columns) stream << ',' << column.name;
-  stream << ",status,reason,input,output,input_unit,output_unit\n";
+  stream << ",status,reason,settled_by,input,output,input_unit,output_unit,"
+         << legend(input, output) << '\n';
   const std::vector<double> phase = unwrapped_phase(response.points);
   for (std::size_t i = 0; i < response.points.size(); ++i) {
     const StoredPoint& point = response.points[i];
@@ -154,8 +169,8 @@ void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse&
       stream << field(value) << ',';
     }
     for (const PointColumn& column : point_columns) stream << field(point.*column.value) << ',';
-    stream << point.status << ',' << point.reason << ',' << input.name << ',' << output.name << ','
-           << input.unit << ',' << output.unit << '\n';
+    stream << point.status << ',' << point.reason << ',' << point.settled_by << ',' << input.name
+           << ',' << output.name << ',' << input.unit << ',' << output.unit << ",\n";
   }
 }
 

@@ -88,6 +88,7 @@ struct Figures {
   std::map<const char*, std::vector<double>> columns;
   std::vector<std::string> status;
   std::vector<std::string> reason;
+  std::vector<std::string> settled_by;
 };
 
 Figures figures_of(const Variables& variables, const matvar_t* response, const Shape& shape) {
@@ -95,10 +96,12 @@ Figures figures_of(const Variables& variables, const matvar_t* response, const S
                   .covariance = real_values(variables.find("CovarianceData")),
                   .columns = {},
                   .status = text_values(variables.find("status")),
-                  .reason = text_values(variables.find("reason"))};
+                  .reason = text_values(variables.find("reason")),
+                  .settled_by = text_values(variables.find("settled_by"))};
   if (figures.covariance.size() != 4 * shape.size()) figures.covariance.clear();
   if (figures.status.size() != shape.size()) figures.status.clear();
   if (figures.reason.size() != shape.size()) figures.reason.clear();
+  if (figures.settled_by.size() != shape.size()) figures.settled_by.clear();
   for (const PointColumn& column : point_columns) {
     std::vector<double> values = real_values(variables.find(column.name));
     if (values.size() == shape.size()) figures.columns.emplace(column.name, std::move(values));
@@ -119,6 +122,7 @@ StoredPoint point_of(const Figures& figures, std::size_t at, std::size_t size) {
   }
   if (!figures.status.empty()) point.status = figures.status[at];
   if (!figures.reason.empty()) point.reason = figures.reason[at];
+  if (!figures.settled_by.empty()) point.settled_by = figures.settled_by[at];
   return point;
 }
 

@@ -11,8 +11,6 @@ namespace sinerig::record {
 
 namespace {
 
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-
 // The channels on one side of the responses, each once, in the order of their first appearance.
 std::vector<std::uint32_t> distinct(const std::vector<const StoredResponse*>& responses,
                                     std::uint32_t StoredResponse::*side) {
@@ -148,6 +146,7 @@ void write_mat(const std::string& path, const StoredRun& run,
   }
   write(mat_texts("status", grid.dimensions(), grid.texts(&StoredPoint::status)));
   write(mat_texts("reason", grid.dimensions(), grid.texts(&StoredPoint::reason)));
+  write(mat_texts("settled_by", grid.dimensions(), grid.texts(&StoredPoint::settled_by)));
   write(mat_text("Notes", response_convention));
   if (!written) throw SweepFileError(path + ": cannot be written");
 }

@@ -15,8 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
-
 std::string extension_of(const std::string& path) {
   std::string extension = fs::path{path}.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),

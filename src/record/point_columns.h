@@ -19,6 +19,7 @@ inline constexpr std::array point_columns{
     PointColumn{"input_amplitude", &StoredPoint::input_amplitude},
     PointColumn{"output_amplitude", &StoredPoint::output_amplitude},
     PointColumn{"snr_db", &StoredPoint::snr_db},
+    PointColumn{"coherence", &StoredPoint::coherence},
     PointColumn{"distortion", &StoredPoint::distortion},
     PointColumn{"drift_per_s", &StoredPoint::drift_per_s},
     PointColumn{"samples", &StoredPoint::samples},

@@ -1,9 +1,11 @@
 #include "record/stored_point.h"
 
+#include "record/confidence.h"
+
 namespace sinerig::record {
 
-StoredPoint stored_point(const Point& point) {
-  return {.dwell = point.dwell,
+StoredPoint stored_point(const Point& point, double rate_hz) {
+  StoredPoint stored{.dwell = point.dwell,
           .tone = point.tone,
           .input = point.input,
           .output = point.output,
@@ -26,6 +28,8 @@ StoredPoint stored_point(const Point& point) {
           .reason_value = point.reason_value,
           .settled_by = to_string(point.settled_by),
           .more = {}};
+  stored.coherence = coherence(stored, rate_hz);
+  return stored;
 }
 
 }  // namespace sinerig::record

@@ -6,7 +6,7 @@
 
 namespace sinerig::record {
 
-// What reading the written point back would give.
-StoredPoint stored_point(const Point& point);
+// What reading the written point back would give, from a run at this rate.
+StoredPoint stored_point(const Point& point, double rate_hz);
 
 }  // namespace sinerig::record

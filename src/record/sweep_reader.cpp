@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <numbers>
 
+#include "record/confidence.h"
 #include "record/schema.h"
 
 namespace sinerig::record {
@@ -63,7 +64,7 @@ SweepPlan read_plan(Database& database, double rate_hz) {
   return plan;
 }
 
-std::vector<StoredResponse> read_responses(Database& database) {
+std::vector<StoredResponse> read_responses(Database& database, double rate_hz) {
   std::vector<StoredResponse> responses;
   const bool knows_settling = has_column(database, "point", "settled_by");
   Statement rows{
@@ -97,6 +98,7 @@ std::vector<StoredResponse> read_responses(Database& database) {
                       .reason_value = rows.number(23),
                       .settled_by = knows_settling ? rows.text(24) : "",
                       .more = {}};
+    point.coherence = coherence(point, rate_hz);
     const bool same_pair = !responses.empty() && responses.back().input == point.input &&
                            responses.back().output == point.output;
     if (!same_pair)
@@ -208,7 +210,7 @@ StoredRun read_sweep(const std::string& path) {
   while (channels.step())
     run.channels.push_back({.name = channels.text(0), .unit = channels.text(1)});
   run.plan = read_plan(database, std::strtod(run.fact("rate_hz").c_str(), nullptr));
-  run.responses = read_responses(database);
+  run.responses = read_responses(database, run.plan.rate_hz);
   read_more_columns(database, run.responses);
   run.fits = read_fits(database);
   run.events = read_events(database);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -11,6 +12,8 @@
 #include "record/sweep_writer.h"
 
 namespace sinerig::record {
+
+inline constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
 
 struct StoredPoint {
   std::uint32_t dwell = 0;
@@ -26,6 +29,7 @@ struct StoredPoint {
   double input_amplitude = 0.0;
   double output_amplitude = 0.0;
   double snr_db = 0.0;
+  double coherence = nan_value;  // as coherence() of record/confidence.h; NaN where not known
   double distortion = 0.0;
   double drift_per_s = 0.0;
   double samples = 0.0;

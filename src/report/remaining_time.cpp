@@ -6,8 +6,8 @@ namespace sinerig::report {
 
 void RemainingTime::update(std::uint32_t dwell, std::uint64_t tick) {
   const auto last = static_cast<std::uint32_t>(plan_.dwells.size());
-  while (dwell_ < std::min(dwell, last)) {
-    least_so_far_ += plan_.dwells[dwell_].min_samples();
+  while (dwell_ < dwell) {
+    if (dwell_ < last) least_so_far_ += plan_.dwells[dwell_].min_samples();
     ++dwell_;
     dwell_tick_ = tick;
   }

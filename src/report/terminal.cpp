@@ -221,17 +221,17 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
     stream << text("\n%s / %s   (%s per %s)\n", output.name.c_str(), input.name.c_str(),
                    output.unit.c_str(), input.unit.c_str());
     const bool modelled = any_modelled(response);
-    stream << text("%12s %10s %8s %10s %8s %10s %7s %7s %8s  %s\n", "Hz", "gain dB", "± dB",
-                   "phase °", "± °", "amplitude", "SNR dB", "THD %", "seconds",
+    stream << text("%12s %10s %8s %10s %8s %10s %7s %9s %7s %8s  %s\n", "Hz", "gain dB", "± dB",
+                   "phase °", "± °", "amplitude", "SNR dB", "coherence", "THD %", "seconds",
                    modelled ? "settled by  status" : "status");
     const std::vector<double> phase = record::unwrapped_phase(response.points);
     for (std::size_t i = 0; i < response.points.size(); ++i) {
       const record::StoredPoint& point = response.points[i];
-      stream << text("%12.6f %10.4f %8.2g %10.3f %8.2g %10.4g %7.1f %7.2f %8.2f  ",
+      stream << text("%12.6f %10.4f %8.2g %10.3f %8.2g %10.4g %7.1f %9.6f %7.2f %8.2f  ",
                      point.frequency_hz, 20.0 * std::log10(std::abs(point.response)),
                      point.gain_interval_db, phase[i] * degrees_per_radian,
                      point.phase_interval_deg, point.input_amplitude, point.snr_db,
-                     100.0 * point.distortion, point.seconds);
+                     point.coherence, 100.0 * point.distortion, point.seconds);
       if (modelled) stream << text("%-12s", point.settled_by.c_str());
       stream << point.status;
       if (!point.reason.empty())

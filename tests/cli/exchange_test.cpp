@@ -74,6 +74,53 @@ printf('%.17g %.17g %.17g\n', [c{1} c{2} c{3}]');
   expect_response(octave.output, 1e-12);
 }
 
+// What spreadsheets and scripts do without being told anything: one line of names, then rows.
+TEST_F(Exchange, OctaveReadsTheCsvAsAPlainTable) {
+  if (!here("octave-cli")) GTEST_SKIP() << "no Octave here (Debian: apt install octave)";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep -o axis.csv").exit_code, 0);
+  workshop_.write("check.m", R"m(
+t = csvread('axis.csv', 1, 0);
+s = load('axis.mat');
+assert(rows(t), numel(s.Frequency));
+d = importdata('axis.csv', ',', 1);
+assert(d.data(:, 1:3), t(:, 1:3));
+printf('%.17g %.17g %.17g\n', t(:, 1:3)');
+)m");
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep --format mat -o axis.mat").exit_code, 0);
+  const auto octave = workshop_.shell("octave-cli --no-init-file check.m");
+  EXPECT_EQ(octave.exit_code, 0) << octave.errors;
+  expect_response(octave.output, 1e-12);
+}
+
+TEST_F(Exchange, PythonReadsTheCsv) {
+  if (workshop_.shell("/usr/bin/python3 -c 'import numpy'").exit_code != 0)
+    GTEST_SKIP() << "no numpy here (Debian: apt install python3-scipy)";
+  ASSERT_EQ(workshop_.sinerig("export axis.sweep -o axis.csv").exit_code, 0);
+  workshop_.write("read.py", R"py(
+import csv, numpy
+rows = list(csv.DictReader(open('axis.csv', newline='')))
+assert all(None not in row and None not in row.values() for row in rows)
+table = numpy.genfromtxt('axis.csv', delimiter=',', names=True, dtype=None, encoding='utf-8')
+assert len(table) == len(rows)
+assert table['coherence'].min() > 0 and table['coherence'].max() <= 1
+assert set(table['status']) == {'good'}
+try:
+    import pandas
+except ImportError:
+    pandas = None
+if pandas:
+    frame = pandas.read_csv('axis.csv')
+    assert list(frame.columns[:5]) == ['freq_hz', 're', 'im', 'gain_db', 'phase_deg']
+    assert (frame['re'].to_numpy() == table['re']).all()
+for row, entry in zip(rows, table):
+    assert float(row['re']) == entry['re']
+    print(row['freq_hz'], row['re'], row['im'])
+)py");
+  const auto python = workshop_.shell("/usr/bin/python3 read.py");
+  EXPECT_EQ(python.exit_code, 0) << python.errors;
+  expect_response(python.output, 1e-12);
+}
+
 TEST_F(Exchange, OctaveRunsTheMatlabSnippet) {
   if (!here("octave-cli")) GTEST_SKIP() << "no Octave here (Debian: apt install octave)";
   ASSERT_EQ(workshop_.sinerig("export axis.sweep --format snippet -o axis.m").exit_code, 0);

@@ -54,8 +54,18 @@ TEST(RunningEstimate, BeginsAnewWithEachAttempt) {
   add(estimate, 0, {1.0, 0.0}, {7.0, 0.0}, 1);
   EXPECT_EQ(estimate.value()->response, std::complex<double>(7.0, 0.0));
   EXPECT_EQ(estimate.value()->blocks, 1U);
-  estimate.start();
-  EXPECT_FALSE(estimate.value());
+}
+
+TEST(RunningEstimate, KeepsToItsTone) {
+  RunningEstimate second{1, 2, 1};
+  add(second, 0, {1.0, 0.0}, {5.0, 0.0});
+  EXPECT_FALSE(second.value());
+  for (const std::uint16_t channel : {1, 2}) {
+    Block block = block_of(0, channel, {channel == 1 ? 0.5 : 1.5, 0.0});
+    block.tone = 1;
+    second.add(block);
+  }
+  EXPECT_EQ(second.value()->response, std::complex<double>(3.0, 0.0));
 }
 
 // 95 % intervals hold the truth in 95 % of the cases: within 4 standard deviations of that count.

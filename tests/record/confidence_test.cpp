@@ -64,5 +64,33 @@ TEST(Confidence, ACircularScatterComesBackAsItsVariance) {
   EXPECT_NEAR(circular_variance(point), 3e-6, 1e-15);
 }
 
+// y = H u + v with v of variance s² in each component of its coefficient over one cycle: the part of
+// the power that goes with u is |HU|²/(|HU|² + 2 s²), and n cycles leave H with s²/(n |U|²).
+TEST(Coherence, IsThePartOfTheOutputsPowerThatGoesWithTheInput) {
+  constexpr double rate_hz = 1000.0;
+  constexpr double cycles = 80.0;
+  constexpr double input = 0.5;
+  constexpr double noise = 0.3;
+  StoredPoint point = test::lag_point(0, 10.0, 1.0, 2);
+  point.samples = cycles * rate_hz / point.frequency_hz;
+  const double variance = noise * noise / (cycles * input * input);
+  point.covariance = {.re_re = 0.5 * variance, .re_im = 0.0, .im_im = 1.5 * variance};
+  const double signal = input * input * std::norm(point.response);
+  EXPECT_NEAR(coherence(point, rate_hz), signal / (signal + 2.0 * noise * noise), 1e-12);
+  // Twice as long with half the variance is the same rig.
+  point.samples *= 2.0;
+  point.covariance = point.covariance.scaled(0.5);
+  EXPECT_NEAR(coherence(point, rate_hz), signal / (signal + 2.0 * noise * noise), 1e-12);
+}
+
+TEST(Coherence, IsOneWithoutNoiseAndUnknownWithoutScatterOrRate) {
+  StoredPoint point = test::lag_point(0, 10.0, 1.0, 2);
+  point.covariance = {.re_re = 0.0, .re_im = 0.0, .im_im = 0.0};
+  EXPECT_EQ(coherence(point, 1000.0), 1.0);
+  EXPECT_TRUE(std::isnan(coherence(point, 0.0)));
+  point.dof = 0.0;
+  EXPECT_TRUE(std::isnan(coherence(point, 1000.0)));
+}
+
 }  // namespace
 }  // namespace sinerig::record

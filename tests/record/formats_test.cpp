@@ -1,4 +1,5 @@
 // What is written can be read back: CSV and MATLAB files to the last bit, UFF 58 to its columns.
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -56,6 +57,7 @@ void expect_same_points(const std::vector<StoredPoint>& a, const std::vector<Sto
       expect_same(a[i].*column.value, b[i].*column.value, column.name);
     EXPECT_EQ(a[i].status, b[i].status);
     EXPECT_EQ(a[i].reason, b[i].reason);
+    EXPECT_EQ(a[i].settled_by, b[i].settled_by);
   }
 }
 
@@ -72,6 +74,30 @@ TEST_F(Formats, CsvLosesNothing) {
   EXPECT_EQ(back[0].input.name, "applied");
   EXPECT_EQ(back[0].input.unit, "Nm");
   expect_same_points(back[0].points, run_.responses[1].points);
+}
+
+// Its first line is all the head there is: it begins with the columns that scripts rely on, and says
+// units and signs without a comma too many.
+TEST_F(Formats, CsvSaysUnitsAndSignsInItsFirstLine) {
+  run_.channels[1].unit = "N,m";
+  std::ostringstream text;
+  write_csv(text, run_, run_.responses[1]);
+  std::istringstream lines{text.str()};
+  std::string head;
+  std::string row;
+  std::getline(lines, head);
+  std::getline(lines, row);
+  EXPECT_THAT(head, testing::StartsWith("freq_hz,re,im,gain_db,phase_deg,"));
+  EXPECT_THAT(head, testing::EndsWith(
+                        ",H = Y/U; Y = b1 + j a1; y ~ a0 + a1 cos wt + b1 sin wt: negative phase "
+                        "lags; re and im in rad/s per N;m; intervals are half widths of 95 %"));
+  run_.channels[1].unit = "Nm";
+  std::ostringstream again;
+  write_csv(again, run_, run_.responses[1]);
+  std::istringstream same{again.str()};
+  std::getline(same, head);
+  std::getline(same, row);
+  EXPECT_EQ(std::count(head.begin(), head.end(), ','), std::count(row.begin(), row.end(), ','));
 }
 
 TEST_F(Formats, MatLosesNothing) {

@@ -33,6 +33,7 @@ inline record::StoredPoint lag_point(std::uint32_t dwell, double frequency_hz, d
           .input_amplitude = 0.5,
           .output_amplitude = 0.5 * std::abs(response),
           .snr_db = 46.0,
+          .coherence = 1.0 - 1.0 / (3.0 * frequency_hz),
           .distortion = 0.002,
           .drift_per_s = 0.0,
           .samples = 8000.0,
@@ -41,6 +42,7 @@ inline record::StoredPoint lag_point(std::uint32_t dwell, double frequency_hz, d
           .status = "good",
           .reason = "",
           .reason_value = 0.0,
+          .settled_by = dwell % 2 == 0 ? "detection" : "model",
           .more = {}};
 }
 

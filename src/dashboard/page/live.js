@@ -53,9 +53,12 @@ function drawHead() {
   if (!s || live.stops) return;
   document.getElementById('progress').style.width = (100 * s.done).toFixed(2) + '%';
   document.getElementById('where').innerHTML =
-    `<b>${Math.min(s.dwell + 1, page.dwells)}</b> of ${page.dwells} dwells` +
-    (s.hz === undefined ? '' : ` · <b>${significant(inFrequency(s.hz), 5)} ${frequencyUnit()}</b>`) +
-    ` · ${duration(s.elapsed_s)} elapsed · <b id="left">${duration(s.remaining_s)}</b> left`;
+    placeText(s) +
+    (s.hz ? ` · <b>${tonesText(s.hz)}</b>` : '') +
+    ` · ${duration(s.elapsed_s)} elapsed · ` +
+    (s.remaining_s === null
+      ? '<b id="left">as long as it takes</b>'
+      : `<b id="left">${duration(s.remaining_s)}</b> left`);
 }
 
 // Columns that belong to a point each; those in `extra` come and go.
@@ -91,24 +94,36 @@ function takeLog(log) {
     timing.histogram[i] = (timing.histogram[i] || 0) + n;
   });
   events.push(...log.events);
+  for (const { r, f, status, settled } of log.responses)
+    if (r === 0 && f.length) live.last = { f: f.at(-1), status: status.at(-1), settled: settled.at(-1) };
   live.log = true;
 }
 
-// What the dwell under way tells so far, drawn among the finished points.
+// What the dwell under way tells so far of each of its tones, drawn among the finished points.
 function underWay(gain) {
   const s = now.status;
-  if (!s || live.ended || s.hz === undefined) return [];
-  return page.responses.flatMap((r, i) => {
-    const e = s.estimates[i];
-    if (!state.shown[i] || !e) return [];
-    let value = gain ? inGain(Math.hypot(e.re, e.im)) : Math.atan2(e.im, e.re);
-    if (!gain) {
-      const near = r.arg.length ? r.arg[nearest(r.f, s.hz)] : null;
-      if (near !== null && !state.wrapped) value += turn * Math.round((near - value) / turn);
-      value = inPhase(value);
-    }
-    return [{ style: colour(r), f: [s.hz], y: [value], marks: true, status: ['now'] }];
-  });
+  if (!s || live.ended || !s.hz) return [];
+  const valueOf = (r, hz, e) => {
+    if (!e) return null;
+    if (gain) return inGain(Math.hypot(e.re, e.im));
+    let arg = Math.atan2(e.im, e.re);
+    const near = r.arg.length ? r.arg[nearest(r.f, hz)] : null;
+    if (near !== null && !state.wrapped) arg += turn * Math.round((near - arg) / turn);
+    return inPhase(arg);
+  };
+  return page.responses.flatMap((r, i) =>
+    state.shown[i]
+      ? [
+          {
+            style: colour(r),
+            f: s.hz,
+            y: s.hz.map((hz, tone) => valueOf(r, hz, s.estimates[i][tone])),
+            marks: true,
+            status: s.hz.map(() => 'now'),
+          },
+        ]
+      : [],
+  );
 }
 
 function withUnderWay(spec, gain) {
@@ -122,7 +137,7 @@ function refreshSmall() {
   const shown = ['late_us', 'faults', 'switches'].filter(key =>
     page.runs[0].timing[key].some(v => v > 0),
   );
-  const signature = ['gain95', 'snr', 'distortion', 'amplitude', 'response']
+  const signature = ['gain95', 'snr', 'coherence', 'distortion', 'amplitude', 'response']
     .filter(has)
     .concat(extras, shown)
     .join();

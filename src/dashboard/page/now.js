@@ -2,6 +2,37 @@
 
 const now = { status: null };
 
+// Which part of the sweep this is.
+const kinds = {
+  waiting: 'waiting for the first tick',
+  preflight: 'pre-flight dwell',
+  probe: 'probe',
+  refined: 'refined dwell',
+  remeasured: 'measured again',
+  closing: 'back to neutral',
+};
+
+const tonesText = hz => hz.map(f => significant(inFrequency(f), 5)).join(', ') + ' ' + frequencyUnit();
+
+function placeText(s) {
+  if (s.kind === 'planned') return `<b>${Math.min(s.dwell + 1, page.dwells)}</b> of ${page.dwells} dwells`;
+  const added =
+    s.kind === 'refined'
+      ? ` <b>${s.dwell + 1 - page.dwells}</b> beside the ${page.dwells} of the plan`
+      : s.kind === 'remeasured'
+        ? `: dwell <b>${s.dwell + 1}</b>`
+        : '';
+  return kinds[s.kind] + added;
+}
+
+// How the point before came about: a transient that was modelled has not been waited for.
+function lastText() {
+  const last = live.last;
+  if (!last) return '';
+  const way = { model: ', transient modelled', detection: ', transient seen to go', wait: ', waited for' };
+  return `<p class="plain" id="last">before: ${significant(inFrequency(last.f), 5)} ${frequencyUnit()} ${esc(last.status.replace(/_/g, ' '))}${way[last.settled] || ''}</p>`;
+}
+
 const nowMargin = { left: 14, right: 14, top: 12, bottom: 22 };
 
 function seconds(s) {
@@ -56,7 +87,9 @@ function drawSignal() {
   const length = trace.step_s * (count - 1);
   html += `<text x="${width - nowMargin.right}" y="${height - 6}" text-anchor="end">now</text><text x="${nowMargin.left}" y="${height - 6}">−${seconds(length)}</text>`;
   box.innerHTML = `<svg height="${height}" viewBox="0 0 ${width} ${height}">${html}</svg>`;
-  document.getElementById('signal-note').textContent = hz ? `${fixed(length * hz, 1)} cycles` : '';
+  document.getElementById('signal-note').textContent = hz
+    ? `${fixed(length * Math.min(...hz), 1)} cycles${hz.length > 1 ? ' of the slowest tone' : ''}`
+    : '';
 }
 
 // Output over input of the first response shown. A line is a gain without lag, a circle a quarter turn.
@@ -90,8 +123,11 @@ function drawLissajous() {
     `${page.channels[output].name} over ${page.channels[input].name}`;
 }
 
-function estimateRow(estimate, r) {
-  const name = `<b style="${colour(r)}">${esc(r.name)}</b>`;
+// One response at one tone; the frequency stands with it where there are several.
+function estimateRow(estimate, r, tone) {
+  const name =
+    `<b style="${colour(r)}">${esc(r.name)}</b>` +
+    (tone === null ? '' : ` <i>${significant(inFrequency(tone), 4)} ${frequencyUnit()}</i>`);
   if (!estimate) return `<tr><td>${name}</td><td class="n plain" colspan="2">no block yet</td></tr>`;
   const abs = Math.hypot(estimate.re, estimate.im),
     arg = Math.atan2(estimate.im, estimate.re);
@@ -127,15 +163,23 @@ function guardRow(row) {
 
 function drawState() {
   const s = now.status;
-  const blocks = s.estimates.length && s.estimates[0] ? s.estimates[0].blocks : 0;
-  document.getElementById('dwell-note').textContent =
-    s.hz === undefined
-      ? ''
-      : `${significant(inFrequency(s.hz), 5)} ${frequencyUnit()}${s.tones > 1 ? ` and ${s.tones - 1} more` : ''}, amplitude ${significant(s.amplitude, 3)} ${page.channels[0].unit}` +
-        (s.retries ? `, try ${s.retries + 1}` : '');
+  const first = s.estimates.length ? s.estimates[0][0] : null;
+  const several = s.hz && s.hz.length > 1;
+  document.getElementById('dwell-note').textContent = [
+    s.kind === 'planned' ? '' : kinds[s.kind],
+    s.hz ? tonesText(s.hz) : '',
+    s.amplitude ? `amplitude ${significant(s.amplitude, 3)} ${page.channels[0].unit}` : '',
+    s.retries ? `try ${s.retries + 1}` : '',
+  ]
+    .filter(Boolean)
+    .join(', ');
   document.getElementById('estimate').innerHTML =
-    `<table>${page.responses.map((r, i) => estimateRow(s.estimates[i], r)).join('')}</table>` +
-    `<p class="plain">${s.waiting ? 'waiting for the transient' : blocks ? `from the last ${count(blocks, 'block', 'blocks')}` : 'measuring'}, ${seconds(s.dwell_s)} of at most ${s.dwell_most_s === undefined ? '–' : seconds(s.dwell_most_s)}</p>`;
+    (s.hz
+      ? `<table>${page.responses.map((r, i) => s.hz.map((hz, tone) => estimateRow(s.estimates[i][tone], r, several ? hz : null)).join('')).join('')}</table>` +
+        `<p class="plain">${s.waiting ? 'waiting for the transient' : first ? `from the last ${count(first.blocks, 'block', 'blocks')}` : 'measuring'}, ${seconds(s.dwell_s)} of at most ${seconds(s.dwell_most_s)}</p>`
+      : s.kind === 'probe'
+        ? `<p class="plain">a chirp from ${significant(inFrequency(page.probe[0]), 3)} to ${significant(inFrequency(page.probe[1]), 3)} ${frequencyUnit()} that shows the modes of the rig</p>`
+        : '') + lastText();
   document.getElementById('guard').innerHTML = s.headroom.length
     ? `<table>${s.headroom.map(guardRow).join('')}</table>`
     : '<p class="plain">this rig file sets no limits</p>';

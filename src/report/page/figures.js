@@ -192,8 +192,8 @@ const differences = gain =>
 const has = key => page.responses.some(r => r[key].some(v => v !== null && v > 0));
 
 function smallPlots(host) {
-  const simple = (id, title, unit, values, log) =>
-    new Plot(host, { id, height: 200, log, title: () => title, unit, layers: () => measured(values) });
+  const simple = (id, title, unit, values, log, clamp) =>
+    new Plot(host, { id, height: 200, log, title: () => title, unit, layers: () => measured(values), clamp });
   if (page.responses.some(r => r.gain95.some(v => v > 0))) {
     simple(
       'gain95',
@@ -217,6 +217,15 @@ function smallPlots(host) {
       () => 'dB, tone over residual, per sample',
       r => r.snr,
       false,
+    );
+  if (has('coherence'))
+    simple(
+      'coherence',
+      'Coherence',
+      () => 'γ², over records of one cycle',
+      r => r.coherence,
+      false,
+      lo => [Math.min(lo, 0.9), 1 + 0.03 * (1 - Math.min(lo, 0.9))],
     );
   if (has('distortion'))
     simple(

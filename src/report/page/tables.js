@@ -34,6 +34,7 @@ function readoutRow(r) {
     `<span class="num" data-value="phase">${withInterval(phase, phaseHalf(r, i), state.degrees ? 2 : 4)}<i>${state.degrees ? '°' : ' rad'}</i></span>`,
   ];
   if (r.snr[i] !== null) pieces.push(`<span><i>SNR</i> ${fixed(r.snr[i], 0)} <i>dB</i></span>`);
+  if (r.coherence[i] !== null) pieces.push(`<span><i>coherence</i> ${fixed(r.coherence[i], 6)}</span>`);
   if (r.amplitude[i] !== null)
     pieces.push(`<span><i>applied</i> ${significant(r.amplitude[i], 3)} <i>${esc(r.input_unit)}</i></span>`);
   if (r.distortion[i] > 0)
@@ -67,6 +68,7 @@ function pointsTable(r) {
     'phase ' + phaseUnit(),
     '± 95 %',
     'SNR dB',
+    'coherence',
     `applied ${r.input_unit}`,
     `response ${r.output_unit}`,
     'distortion %',
@@ -83,6 +85,7 @@ function pointsTable(r) {
       fixed(phase[i], decimals(p, state.degrees ? 2 : 4)),
       significant(p, 2),
       fixed(r.snr[i], 0),
+      fixed(r.coherence[i], 6),
       significant(r.amplitude[i], 4),
       significant(r.response[i], 4),
       significant(r.distortion[i] === null ? null : 100 * r.distortion[i], 2),
