@@ -165,6 +165,11 @@ void write_bash(std::ostream& stream, const std::vector<CompletedCommand>& comma
             "complete -F _sinerig sinerig\n";
 }
 
+// A single word in brackets at the end of a pattern would be a qualifier.
+std::string zsh_pattern(const std::string& extensions) {
+  return extensions.find('|') == std::string::npos ? "*." + extensions : "*.(" + extensions + ")";
+}
+
 void write_zsh(std::ostream& stream, const std::vector<CompletedCommand>& commands) {
   stream << "#compdef sinerig\n# zsh completion for sinerig: sinerig completion zsh\n"
             "_sinerig() {\n"
@@ -188,7 +193,7 @@ void write_zsh(std::ostream& stream, const std::vector<CompletedCommand>& comman
         stream << " \\\n            '" << name << text << "'";
     }
     if (!command.files.empty())
-      stream << " \\\n            '*:file:_files -g \"*.(" << command.files << ")\"'";
+      stream << " \\\n            '*:file:_files -g \"" << zsh_pattern(command.files) << "\"'";
     if (!command.words.empty())
       stream << " \\\n            '1:word:(" << quoted(joined(command.words, " ")) << ")'";
     stream << " ;;\n";
@@ -205,8 +210,10 @@ void write_fish(std::ostream& stream, const std::vector<CompletedCommand>& comma
            << quoted(command.description) << "'\n";
     const std::string when =
         "complete -c sinerig -n '__fish_seen_subcommand_from " + command.name + "'";
-    for (const std::string& extension : split(command.files, '|'))
-      stream << when << " -a '(__fish_complete_suffix ." << extension << ")'\n";
+    if (!command.files.empty())
+      stream << when
+             << " -k -a '(__fish_complete_path (commandline -ct) | string match -r -- \"^.*(?:\\.(?:"
+             << command.files << ")|/)(?:\\t.*)?\\$\")'\n";
     if (!command.words.empty())
       stream << when << " -a '" << quoted(joined(command.words, " ")) << "'\n";
     for (const CompletedOption& option : command.options) {

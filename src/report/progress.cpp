@@ -34,7 +34,9 @@ double gain_db(const Point& point) {
 
 std::string status_text(const Point& point) {
   const std::string reason = to_string(point.reason);
-  return to_string(point.status) + (reason.empty() ? "" : ": " + reason);
+  const bool modelled = point.settled_by == SettledBy::model;
+  return to_string(point.status) + (reason.empty() ? "" : ": " + reason) +
+         (modelled ? ", transient modelled" : "");
 }
 
 std::string line_of(const Point& point, std::size_t number, std::size_t points) {
@@ -42,7 +44,10 @@ std::string line_of(const Point& point, std::size_t number, std::size_t points) 
   const auto half = [](const char* format, double value) {
     return std::isfinite(value) ? text(format, value) : std::string{" ±–      "};
   };
-  return text("%4zu/%zu %10.4f Hz  %9.3f dB", number, points, point.frequency_hz, gain_db(point)) +
+  // Points that refinement adds are none of the plan's.
+  const std::string place = number > points ? text("%4zu+%zu", points, number - points)
+                                            : text("%4zu/%zu", number, points);
+  return place + text(" %10.4f Hz  %9.3f dB", point.frequency_hz, gain_db(point)) +
          half(" ±%-7.2g", point.gain_interval_db) +
          text("  %8.2f°", std::arg(point.response) * degrees_per_radian) +
          half(" ±%-7.2g", point.phase_interval_deg) + "  ";
@@ -139,14 +144,18 @@ std::vector<std::string> Progress::plot(std::size_t width) const {
 }
 
 std::vector<std::string> Progress::picture() const {
-  const std::size_t number = std::min<std::size_t>(dwell_ + 1, plan_.dwells.size());
-  const Dwell& dwell = plan_.dwells[number - 1];
+  const std::size_t planned = plan_.dwells.size();
+  const bool refining = dwell_ >= planned && plan_.refinement.most_points > 0;
+  const std::size_t number = std::min<std::size_t>(dwell_ + 1, planned);
   std::vector<std::string> lines;
+  const std::string place =
+      refining ? text("%zu+%zu  ", planned, dwell_ + 1 - planned) + bold + "refining" + plain
+               : text("%zu/%zu  ", number, planned) + bold +
+                     text("%.4g Hz", plan_.dwells[number - 1].frequency_hz(plan_.rate_hz)) + plain;
+  const std::string left =
+      refining ? "" : ", " + (bold + duration_text(time_.remaining_s())) + plain + " left";
   const std::string times =
-      text("%zu/%zu  ", number, plan_.dwells.size()) + bold +
-      text("%.4g Hz", dwell.frequency_hz(plan_.rate_hz)) + plain + "  " +
-      duration_text(time_.elapsed_s()) + " elapsed, " + bold + duration_text(time_.remaining_s()) +
-      plain + " left" + (not_good_ == 0 ? "" : yellow + text(", %zu not good", not_good_) + plain);
+      place + "  " + duration_text(time_.elapsed_s()) + " elapsed" + left + (not_good_ == 0 ? "" : yellow + text(", %zu not good", not_good_) + plain);
   lines.push_back(bar(columns_ - 66) + " " + times);
   for (std::string& row : plot(columns_ - 2)) lines.push_back(std::move(row));
   const std::size_t first = points_.size() - std::min(points_.size(), points_shown);

@@ -32,6 +32,18 @@ Json points_fact(const std::vector<StoredPoint>& points) {
   return {"Points", std::to_string(points.size()), remark};
 }
 
+// Nothing where every point was settled the same, usual way.
+Json transient_fact(const std::vector<StoredPoint>& points) {
+  const auto settled_by = [&](const char* way) {
+    return std::count_if(points.begin(), points.end(),
+                         [&](const StoredPoint& point) { return point.settled_by == way; });
+  };
+  const auto modelled = settled_by("model");
+  if (modelled == 0) return nullptr;
+  return {"Transients modelled", text("%td of %zu", static_cast<std::ptrdiff_t>(modelled), points.size()),
+          text("%td seen to go", static_cast<std::ptrdiff_t>(settled_by("detection")))};
+}
+
 Json peak_fact(const StoredRun& run) {
   const record::StoredResponse& response = run.responses.front();
   const StoredPoint* peak = nullptr;
@@ -169,6 +181,7 @@ Json summary_facts(const StoredRun& run) {
     }
     add(peak_fact(run));
     add(interval_fact(points));
+    add(transient_fact(points));
   }
   const double seconds = bench_seconds(run);
   if (seconds > 0.0) add({"Bench time", duration_text(seconds), ""});

@@ -22,7 +22,7 @@
 #include <sys/prctl.h>
 #include <sys/wait.h>
 
-#include "realtime/latency.h"
+#include "bench/lateness.h"
 #include "sim/simulated_rig.h"
 #include "sweep/outbox.h"
 #include "sweep/runner.h"
@@ -30,6 +30,8 @@
 namespace {
 
 using namespace sinerig;
+using bench::NotingClock;
+using bench::quantile_us;
 using realtime::LatencyHistogram;
 
 constexpr double rate_hz = 1000.0;
@@ -42,18 +44,6 @@ struct Options {
   int cpu = 0;
   bool fifo = true;
 };
-
-// Each bin's latencies spread evenly over its microsecond: both histograms have the same bins.
-double quantile_us(const LatencyHistogram& histogram, double part) {
-  const double wanted = part * static_cast<double>(histogram.count());
-  double seen = 0.0;
-  for (const auto& [microseconds, count] : histogram.filled_bins()) {
-    const auto here = static_cast<double>(count);
-    if (seen + here >= wanted) return static_cast<double>(microseconds) + (wanted - seen) / here;
-    seen += here;
-  }
-  return 0.0;
-}
 
 LatencyHistogram run_cyclictest(const Options& options) {
   std::string command =
@@ -90,35 +80,6 @@ LatencyHistogram run_waiting(const Options& options) {
   return realtime::measure_wake_ups(thread, rate_hz, wake_ups_of(options)).latency;
 }
 
-// Notes how late each tick is, and asks for the end after so many.
-class NotingClock final : public Clock {
- public:
-  NotingClock(std::uint64_t ticks, RunControl& control)
-      : Clock{TickGrid{rate_hz}}, left_{ticks + 1}, control_{control} {}
-  Tick wait() noexcept SINERIG_NONBLOCKING override {
-    const Tick tick = clock_.wait();
-    if (tick.index > 0) latency.add(realtime::latency_ns(grid(), last_, tick));
-    last_ = tick.index;
-    if (--left_ == 0) control_.stop_requests.store(2, std::memory_order_relaxed);
-    return tick;
-  }
-  Instant now() const noexcept SINERIG_NONBLOCKING override { return clock_.now(); }
-  std::int64_t time_ns(Instant instant) const noexcept SINERIG_NONBLOCKING override {
-    return clock_.time_ns(instant);
-  }
-  std::optional<ThreadUsage> usage() const noexcept SINERIG_NONBLOCKING override {
-    return clock_.usage();
-  }
-
-  LatencyHistogram latency;
-
- private:
-  MonotonicClock clock_{grid()};
-  std::uint64_t left_;
-  std::uint64_t last_ = 0;
-  RunControl& control_;
-};
-
 // A whole sweep of a simulated gimbal with two sensors, its records taken by another thread.
 LatencyHistogram run_sweep(const Options& options) {
   sim::MechanicalAxis axis;
@@ -138,7 +99,7 @@ LatencyHistogram run_sweep(const Options& options) {
 
   realtime::LoopThread thread{settings_of(options)};
   RunControl control;
-  NotingClock clock{wake_ups_of(options), control};
+  NotingClock clock{rate_hz, wake_ups_of(options), control};
   sim::SimulatedRig rig{rig_settings, clock};
   Sensor* const sensors[] = {&rig.sensor(0), &rig.sensor(1)};
   GuardSettings guard_settings;

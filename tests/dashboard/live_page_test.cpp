@@ -39,6 +39,8 @@ class LivePage : public testing::Test {
     browser_ = std::make_unique<test::Browser>(*program);
   }
 
+  explicit LivePage(SweepPlan plan = test::served_plan(points)) : plan_{std::move(plan)} {}
+
   // The whole run, its records kept to be told bit by bit.
   void play() {
     VirtualClock clock{TickGrid{plan_.rate_hz}};
@@ -58,6 +60,14 @@ class LivePage : public testing::Test {
       live_.take(log_.records[told_]);
     }
   }
+  // … up to the first event of a kind, and all of the dwell that follows it but its point.
+  void tell_until(EventKind kind) {
+    for (; told_ < log_.records.size(); ++told_) {
+      const auto* event = std::get_if<Event>(&log_.records[told_]);
+      if (event != nullptr && event->kind == kind) return tell_until(event->dwell);
+      live_.take(log_.records[told_]);
+    }
+  }
   void tell_all() {
     for (; told_ < log_.records.size(); ++told_) live_.take(log_.records[told_]);
   }
@@ -70,7 +80,7 @@ class LivePage : public testing::Test {
   }
   void expect_no_errors() { EXPECT_TRUE(browser_->errors().empty()) << browser_->errors().front(); }
 
-  SweepPlan plan_ = test::served_plan(points);
+  SweepPlan plan_;
   Lateness lateness_;
   RunControl control_;
   RecordLog log_;
@@ -146,6 +156,47 @@ TEST_F(LivePage, WithoutATokenItOnlyWatches) {
   EXPECT_TRUE(browser_->wait_until("!!document.querySelector('#gain [data-status=now]')"));
   EXPECT_LE(browser_->evaluate("document.documentElement.scrollWidth").get<int>(), 390);
   keep_picture("live-narrow");
+  expect_no_errors();
+}
+
+// A resonance between the points of a coarse plan, two tones a dwell.
+SweepPlan coarse_plan() {
+  SweepSettings sweep;
+  sweep.start_hz = 2.0;
+  sweep.stop_hz = 100.0;
+  sweep.points = 6;
+  sweep.tones = 2;
+  sweep.refine_points = 3;
+  sweep.refine_db = 1e-4;
+  sweep.amplitude = 0.4;
+  return plan_sweep(sweep, {}, 1000.0);
+}
+
+class CoarseLivePage : public LivePage {
+ protected:
+  CoarseLivePage() : LivePage{coarse_plan()} {}
+};
+
+TEST_F(CoarseLivePage, ShowsEveryToneAndNamesWhatRefinementAdds) {
+  browser_->open(server_->url(), 1440, 1000);
+  tell_until(0);
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('#estimate tr').length === 2"));
+  EXPECT_TRUE(
+      browser_->wait_until("document.querySelector('#gain [data-status=now]')"
+                           ".getAttribute('d').split('M').length - 1 === 2"));
+  EXPECT_TRUE(browser_->wait_until(
+      "document.getElementById('signal-note').textContent.endsWith('of the slowest tone')"));
+  keep_picture("live-tones");
+  tell_until(EventKind::refined);
+  EXPECT_TRUE(browser_->wait_until(
+      "document.getElementById('where').textContent.startsWith('refined dwell 1 beside the ')"));
+  EXPECT_TRUE(browser_->wait_until(
+      "document.getElementById('dwell-note').textContent.startsWith('refined dwell, ')"));
+  EXPECT_TRUE(browser_->wait_until(
+      "document.getElementById('last').textContent.includes('transient seen to go')"));
+  EXPECT_EQ(browser_->evaluate("document.getElementById('left').textContent"),
+            "as long as it takes");
+  keep_picture("live-refined");
   expect_no_errors();
 }
 

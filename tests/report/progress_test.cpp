@@ -60,6 +60,26 @@ TEST(Progress, DrawsAPictureAndTakesItAway) {
   EXPECT_THAT(stream.str(), testing::EndsWith("\033[" + std::to_string(lines) + "A\r\033[J"));
 }
 
+TEST(Progress, NamesWhatRefinementAddsAndWhatAModelEnded) {
+  std::ostringstream stream;
+  SweepPlan plan = plan_of(2);
+  plan.refinement.most_points = 4;
+  Progress lines{stream, Progress::Style::lines, plan, 200};
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    Point point = point_of(i);
+    if (i == 2) point.settled_by = SettledBy::model;
+    lines.point(point);
+  }
+  EXPECT_THAT(stream.str(), HasSubstr("   2/2     2.0000 Hz"));
+  EXPECT_THAT(stream.str(), HasSubstr("   2+1     3.0000 Hz"));
+  EXPECT_THAT(stream.str(), testing::EndsWith("good, transient modelled\n"));
+  std::ostringstream drawn;
+  Progress live{drawn, Progress::Style::live, plan, 100};
+  live.update(3, 2000);
+  EXPECT_THAT(drawn.str(), HasSubstr("2+2  \033[1mrefining"));
+  EXPECT_THAT(drawn.str(), testing::Not(HasSubstr(" left")));
+}
+
 TEST(Progress, SaysNothingWhenToldSo) {
   std::ostringstream stream;
   Progress progress{stream, Progress::Style::none, plan_of(20), 100};
