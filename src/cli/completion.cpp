@@ -77,12 +77,12 @@ std::vector<CompletedCommand> commands_of(const CLI::App& app) {
   std::vector<CompletedCommand> commands;
   for (const CLI::App* each : app.get_subcommands([](const CLI::App*) { return true; })) {
     const CLI::Option* positional = positional_of(*each);
-    CompletedCommand command{.name = each->get_name(),
-                             .description = each->get_description(),
-                             .files = files_of(positional),
-                             .words = positional == nullptr ? std::vector<std::string>{}
-                                                            : values_of(*positional),
-                             .options = options_of(*each)};
+    CompletedCommand command{
+        .name = each->get_name(),
+        .description = each->get_description(),
+        .files = files_of(positional),
+        .words = positional == nullptr ? std::vector<std::string>{} : values_of(*positional),
+        .options = options_of(*each)};
     for (CompletedOption& option : options_of(app)) {
       const std::string& name = option.names.back();
       if (name != "--help" && name != "--version") command.options.push_back(std::move(option));
@@ -211,9 +211,10 @@ void write_fish(std::ostream& stream, const std::vector<CompletedCommand>& comma
     const std::string when =
         "complete -c sinerig -n '__fish_seen_subcommand_from " + command.name + "'";
     if (!command.files.empty())
-      stream << when
-             << " -k -a '(__fish_complete_path (commandline -ct) | string match -r -- \"^.*(?:\\.(?:"
-             << command.files << ")|/)(?:\\t.*)?\\$\")'\n";
+      stream
+          << when
+          << " -k -a '(__fish_complete_path (commandline -ct) | string match -r -- \"^.*(?:\\.(?:"
+          << command.files << ")|/)(?:\\t.*)?\\$\")'\n";
     if (!command.words.empty())
       stream << when << " -a '" << quoted(joined(command.words, " ")) << "'\n";
     for (const CompletedOption& option : command.options) {

@@ -22,8 +22,7 @@ void add_telling(CLI::App& command, Options& options) {
       "show the run in a browser while it goes on, with a Stop button; --serve=ADDR:PORT "
       "for elsewhere (default " +
           address + ", for this machine only; port 0: any free one)");
-  add_voice(command, options.voice, quiet_run,
-            "print one JSON object per line: plan, points, end");
+  add_voice(command, options.voice, quiet_run, "print one JSON object per line: plan, points, end");
 }
 
 }  // namespace
@@ -32,8 +31,9 @@ void add_voice(CLI::App& command, Voice& voice, const std::string& quiet_help,
                const std::string& json_help) {
   CLI::Option* quiet = command.add_flag_callback(
       "--quiet", [&voice] { voice = Voice::quiet; }, quiet_help);
-  command.add_flag_callback(
-             "--json", [&voice] { voice = Voice::json; }, json_help)
+  command
+      .add_flag_callback(
+          "--json", [&voice] { voice = Voice::json; }, json_help)
       ->excludes(quiet);
 }
 

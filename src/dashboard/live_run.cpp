@@ -168,8 +168,8 @@ Text LiveRun::status() {
   const Moment now = moment();
   const SweepPlan& plan = setup_.run.plan;
   // Nobody knows how many more will be added.
-  const bool more = now.kind == Whereabouts::Kind::refined ||
-                    now.kind == Whereabouts::Kind::remeasured;
+  const bool more =
+      now.kind == Whereabouts::Kind::refined || now.kind == Whereabouts::Kind::remeasured;
   Json json{{"dwell", now.dwell_number},
             {"kind", to_string(now.kind)},
             {"amplitude", rounded(now.amplitude, 5)},

@@ -41,10 +41,10 @@ bool Whereabouts::take_event(const Event& event) {
       retries_ = 0;
     }
     open_ = true;
-    return begin(preflight_                       ? Kind::preflight
-                 : dwell_ == remeasured_          ? Kind::remeasured
-                 : dwell_ >= plan_.dwells.size()  ? Kind::refined
-                                                  : Kind::planned,
+    return begin(preflight_                      ? Kind::preflight
+                 : dwell_ == remeasured_         ? Kind::remeasured
+                 : dwell_ >= plan_.dwells.size() ? Kind::refined
+                                                 : Kind::planned,
                  event.tick);
   }
   return false;

@@ -17,10 +17,10 @@ HalfWidth95 half_width95(const StoredPoint& point);
 // half-widths on average, so that it holds what a transient may have left. NaN where not known.
 double circular_variance(const StoredPoint& point);
 
-// The ordinary coherence γ² of input and output at the tone, as an analyser would find it with records
-// of one cycle: 1 / (1 + 2 n σ²/|H|²), with the variance σ² of each of re and im behind n cycles
-// (Bendat and Piersol, Random Data, section 9.2.4, solved for γ²). 0 to 1; NaN where scatter or rate
-// are not known.
+// The ordinary coherence γ² of input and output at the tone, as an analyser would find it with
+// records of one cycle: 1 / (1 + 2 n σ²/|H|²), with the variance σ² of each of re and im behind n
+// cycles (Bendat and Piersol, Random Data, section 9.2.4, solved for γ²). 0 to 1; NaN where scatter
+// or rate are not known.
 double coherence(const StoredPoint& point, double rate_hz);
 
 // Half-widths that a gain in dB and a phase in degrees have near |H|.

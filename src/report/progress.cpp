@@ -155,7 +155,8 @@ std::vector<std::string> Progress::picture() const {
   const std::string left =
       refining ? "" : ", " + (bold + duration_text(time_.remaining_s())) + plain + " left";
   const std::string times =
-      place + "  " + duration_text(time_.elapsed_s()) + " elapsed" + left + (not_good_ == 0 ? "" : yellow + text(", %zu not good", not_good_) + plain);
+      place + "  " + duration_text(time_.elapsed_s()) + " elapsed" + left +
+      (not_good_ == 0 ? "" : yellow + text(", %zu not good", not_good_) + plain);
   lines.push_back(bar(columns_ - 66) + " " + times);
   for (std::string& row : plot(columns_ - 2)) lines.push_back(std::move(row));
   const std::size_t first = points_.size() - std::min(points_.size(), points_shown);

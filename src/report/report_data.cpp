@@ -165,8 +165,10 @@ const std::vector<std::string>& notes() {
       "A₀ sin ωt and the steady output a₀ + a₁ cos ωt + b₁ sin ωt the gain is √(a₁² + b₁²)/A₀ and "
       "the phase atan2(a₁, b₁); a lag is negative.",
       "Intervals hold the true value in 95 of 100 cases. Signal to noise is the power of the tone "
-      "over that of the residual, per sample; coherence is the part of the output's power that goes "
-      "with the input, over records of one cycle; distortion is that of the harmonics, relative to the "
+      "over that of the residual, per sample; coherence is the part of the output's power that "
+      "goes "
+      "with the input, over records of one cycle; distortion is that of the harmonics, relative to "
+      "the "
       "tone. Points are drawn whatever their status; only good ones are filled.",
       "The rig saw a zero-order hold at the rate of the loop; the measured response includes it."};
   return text;

@@ -40,7 +40,8 @@ Json transient_fact(const std::vector<StoredPoint>& points) {
   };
   const auto modelled = settled_by("model");
   if (modelled == 0) return nullptr;
-  return {"Transients modelled", text("%td of %zu", static_cast<std::ptrdiff_t>(modelled), points.size()),
+  return {"Transients modelled",
+          text("%td of %zu", static_cast<std::ptrdiff_t>(modelled), points.size()),
           text("%td seen to go", static_cast<std::ptrdiff_t>(settled_by("detection")))};
 }
 

@@ -230,8 +230,8 @@ void print_run(std::ostream& stream, const record::StoredRun& run) {
       stream << text("%12.6f %10.4f %8.2g %10.3f %8.2g %10.4g %7.1f %9.6f %7.2f %8.2f  ",
                      point.frequency_hz, 20.0 * std::log10(std::abs(point.response)),
                      point.gain_interval_db, phase[i] * degrees_per_radian,
-                     point.phase_interval_deg, point.input_amplitude, point.snr_db,
-                     point.coherence, 100.0 * point.distortion, point.seconds);
+                     point.phase_interval_deg, point.input_amplitude, point.snr_db, point.coherence,
+                     100.0 * point.distortion, point.seconds);
       if (modelled) stream << text("%-12s", point.settled_by.c_str());
       stream << point.status;
       if (!point.reason.empty())

@@ -1,8 +1,10 @@
 // How late the loop is, tick by tick, for the benchmarks that run it in real time.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "realtime/latency.h"
 #include "sweep/clock.h"
@@ -11,16 +13,29 @@
 namespace sinerig::bench {
 
 // Each bin's latencies spread evenly over its microsecond: those of cyclictest have the same bins.
-inline double quantile_us(const realtime::LatencyHistogram& histogram, double part) {
-  const double wanted = part * static_cast<double>(histogram.count());
-  double seen = 0.0;
-  for (const auto& [microseconds, count] : histogram.filled_bins()) {
-    const auto here = static_cast<double>(count);
-    if (seen + here >= wanted) return static_cast<double>(microseconds) + (wanted - seen) / here;
-    seen += here;
-  }
-  return 0.0;
-}
+double quantile_us(const realtime::LatencyHistogram& histogram, double part);
+
+// The latencies of each round.
+using Rounds = std::vector<realtime::LatencyHistogram>;
+
+realtime::LatencyHistogram merged(const Rounds& rounds);
+
+// Of two quantiles, with its 95 % interval.
+struct Ratio {
+  static constexpr double goal = 1.1;  // at most
+
+  double value = 0.0;
+  double least = 0.0;
+  double most = 0.0;
+
+  bool surely_above() const { return least > goal; }
+  const char* mark() const { return surely_above() ? "!" : most > goal ? "?" : " "; }
+};
+
+inline constexpr std::array parts{0.5, 0.99, 0.999};
+
+// Ratios of the quantiles `parts` of two contenders that took turns, as many rounds each.
+std::array<Ratio, parts.size()> ratios(const Rounds& ours, const Rounds& theirs);
 
 // Notes how late each tick is, and asks for the end after so many.
 class NotingClock final : public Clock {

@@ -43,7 +43,8 @@ void send_text(int socket, const std::string& text) {
 
 [[noreturn]] void watch(const std::vector<int>& sockets) {
   std::vector<pollfd> readable;
-  for (const int socket : sockets) readable.push_back({.fd = socket, .events = POLLIN, .revents = 0});
+  for (const int socket : sockets)
+    readable.push_back({.fd = socket, .events = POLLIN, .revents = 0});
   std::vector<char> bytes(1U << 16U);
   while (poll(readable.data(), readable.size(), -1) >= 0) {
     for (pollfd& each : readable) {
@@ -56,9 +57,9 @@ void send_text(int socket, const std::string& text) {
 
 // A thousand times a second one client goes and another comes.
 [[noreturn]] void misbehave(std::vector<int> sockets, std::uint16_t port) {
-  const std::array<std::string, 5> words{
-      "\x16\x03\x01\x02nonsense\r\n\r\n", "GET /eve", "POST /stop HTTP/1.1\r\nHost: localhost\r\n\r\n",
-      stream_request, std::string(9000, 'x')};
+  const std::array<std::string, 5> words{"\x16\x03\x01\x02nonsense\r\n\r\n", "GET /eve",
+                                         "POST /stop HTTP/1.1\r\nHost: localhost\r\n\r\n",
+                                         stream_request, std::string(9000, 'x')};
   for (std::size_t i = 0;; ++i) {
     int& socket = sockets[i % sockets.size()];
     if (socket >= 0) close(socket);

@@ -11,8 +11,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
-#include <numeric>
-#include <random>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -30,13 +28,16 @@
 namespace {
 
 using namespace sinerig;
+using bench::merged;
 using bench::NotingClock;
+using bench::parts;
 using bench::quantile_us;
+using bench::Ratio;
+using bench::Rounds;
 using realtime::LatencyHistogram;
 
 constexpr double rate_hz = 1000.0;
 constexpr int priority = 80;
-constexpr double goal = 1.1;
 
 struct Options {
   int seconds = 5;
@@ -158,55 +159,6 @@ constexpr std::array contenders{Contender{"cyclictest", run_cyclictest},
                                 Contender{"sinerig, waiting", run_waiting},
                                 Contender{"sinerig, whole loop", run_sweep}};
 
-using Rounds = std::vector<LatencyHistogram>;
-
-LatencyHistogram merged(const Rounds& rounds, const std::vector<std::size_t>& chosen) {
-  LatencyHistogram all;
-  for (const std::size_t round : chosen) all.merge(rounds[round]);
-  return all;
-}
-
-struct Ratio {
-  double value = 0.0;
-  double least = 0.0;  // of its 95 % interval
-  double most = 0.0;
-
-  const char* mark() const { return least > goal ? "!" : most > goal ? "?" : " "; }
-};
-
-constexpr std::array parts{0.5, 0.99, 0.999};
-
-// The rounds are drawn again with repetition, those of both contenders together: a stall of the
-// machine takes many ticks of one round with it, so ticks are no independent samples.
-std::array<Ratio, parts.size()> ratios(const Rounds& ours, const Rounds& theirs) {
-  constexpr std::size_t draws = 200;
-  std::mt19937_64 random{1};
-  std::uniform_int_distribution<std::size_t> any{0, ours.size() - 1};
-  std::vector<std::size_t> chosen(ours.size());
-  std::iota(chosen.begin(), chosen.end(), std::size_t{0});
-  std::array<std::vector<double>, parts.size()> drawn;
-  std::array<Ratio, parts.size()> found;
-  for (std::size_t draw = 0; draw <= draws; ++draw) {
-    const LatencyHistogram our = merged(ours, chosen);
-    const LatencyHistogram their = merged(theirs, chosen);
-    for (std::size_t i = 0; i < parts.size(); ++i) {
-      const double ratio = quantile_us(our, parts[i]) / quantile_us(their, parts[i]);
-      if (draw == 0) {
-        found[i].value = ratio;
-      } else {
-        drawn[i].push_back(ratio);
-      }
-    }
-    std::generate(chosen.begin(), chosen.end(), [&] { return any(random); });
-  }
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    std::sort(drawn[i].begin(), drawn[i].end());
-    found[i].least = drawn[i][draws / 40];
-    found[i].most = drawn[i][draws - 1 - draws / 40];
-  }
-  return found;
-}
-
 // Ratios that are above the goal for certain.
 int compare(const char* title, bool loaded, const Options& options) {
   const Load load{loaded};
@@ -223,18 +175,16 @@ int compare(const char* title, bool loaded, const Options& options) {
   getloadavg(&average, 1);
   std::printf("\n%s, load average %.1f\n%-20s %9s %9s %9s %9s   %s\n", title, average,
               "late by, µs", "p50", "p99", "p99.9", "most", "parts of cyclictest's, 95 % interval");
-  std::vector<std::size_t> all(seen[0].size());
-  std::iota(all.begin(), all.end(), std::size_t{0});
   int missed = 0;
   for (std::size_t i = 0; i < contenders.size(); ++i) {
-    const LatencyHistogram whole = merged(seen[i], all);
+    const LatencyHistogram whole = merged(seen[i]);
     std::printf("%-20s", contenders[i].name);
     for (const double part : parts) std::printf(" %9.1f", quantile_us(whole, part));
     std::printf(" %9.0f  ", whole.max_us());
     if (i > 0) {
-      for (const Ratio& ratio : ratios(seen[i], seen[0])) {
+      for (const Ratio& ratio : bench::ratios(seen[i], seen[0])) {
         std::printf(" %4.2f (%4.2f-%4.2f)%s", ratio.value, ratio.least, ratio.most, ratio.mark());
-        missed += ratio.least > goal ? 1 : 0;
+        missed += ratio.surely_above() ? 1 : 0;
       }
     }
     std::printf("\n");

@@ -34,8 +34,8 @@ class Completion : public testing::Test {
   test::Workshop workshop_;
 };
 
-// What a line becomes: keys, then the arguments that the command is called with. ^T puts all that the
-// shell offers into the line.
+// What a line becomes: keys, then the arguments that the command is called with. ^T puts all that
+// the shell offers into the line.
 struct Line {
   const char* keys;
   const char* arguments;
@@ -80,11 +80,10 @@ TEST_F(Completion, ZshCompletesAtItsPrompt) {
   if (!here("zsh")) GTEST_SKIP() << "no zsh here (Debian: apt install zsh)";
   install("zsh", "_sinerig");
   test::TypedShell zsh{{"zsh", "-f", "-i"}, workshop_.folder()};
-  for (const char* line :
-       {"fpath=($PWD $fpath)", "autoload -U compinit", "compinit -u -D",
-        "zle -C all-matches complete-word _generic", "bindkey '^T' all-matches",
-        "zstyle ':completion:all-matches::::' completer _all_matches _complete",
-        "zstyle ':completion:all-matches:*' insert true"})
+  for (const char* line : {"fpath=($PWD $fpath)", "autoload -U compinit", "compinit -u -D",
+                           "zle -C all-matches complete-word _generic", "bindkey '^T' all-matches",
+                           "zstyle ':completion:all-matches::::' completer _all_matches _complete",
+                           "zstyle ':completion:all-matches:*' insert true"})
     zsh.run(line);
   expect_lines(zsh, completed_everywhere);
   EXPECT_EQ(zsh.arguments_after("sinerig doctor --\x14"),

@@ -64,8 +64,8 @@ TEST(Confidence, ACircularScatterComesBackAsItsVariance) {
   EXPECT_NEAR(circular_variance(point), 3e-6, 1e-15);
 }
 
-// y = H u + v with v of variance s² in each component of its coefficient over one cycle: the part of
-// the power that goes with u is |HU|²/(|HU|² + 2 s²), and n cycles leave H with s²/(n |U|²).
+// y = H u + v with v of variance s² in each component of its coefficient over one cycle: the part
+// of the power that goes with u is |HU|²/(|HU|² + 2 s²), and n cycles leave H with s²/(n |U|²).
 TEST(Coherence, IsThePartOfTheOutputsPowerThatGoesWithTheInput) {
   constexpr double rate_hz = 1000.0;
   constexpr double cycles = 80.0;

@@ -76,8 +76,8 @@ TEST_F(Formats, CsvLosesNothing) {
   expect_same_points(back[0].points, run_.responses[1].points);
 }
 
-// Its first line is all the head there is: it begins with the columns that scripts rely on, and says
-// units and signs without a comma too many.
+// Its first line is all the head there is: it begins with the columns that scripts rely on, and
+// says units and signs without a comma too many.
 TEST_F(Formats, CsvSaysUnitsAndSignsInItsFirstLine) {
   run_.channels[1].unit = "N,m";
   std::ostringstream text;

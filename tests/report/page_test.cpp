@@ -79,8 +79,8 @@ LabelledRun run_of(std::size_t points) {
 
 TEST_F(Page, DrawsEveryPlotWithoutAnError) {
   show(run_of(40));
-  for (const char* id : {"gain", "phase", "nyquist", "gain95", "phase95", "snr", "coherence", "amplitude",
-                         "response", "lateness", "histogram", "faults", "switches"}) {
+  for (const char* id : {"gain", "phase", "nyquist", "gain95", "phase95", "snr", "coherence",
+                         "amplitude", "response", "lateness", "histogram", "faults", "switches"}) {
     const std::string inside = "!!document.querySelector('#" + std::string{id} + " svg path')";
     EXPECT_TRUE(browser_->evaluate(inside).get<bool>()) << id;
   }

@@ -21,8 +21,8 @@ class TypedShell {
   // A line of set-up; waits until the shell has done it.
   void run(const std::string& line);
 
-  // Types `keys` and a return, where the command is `sinerig`: the arguments that it would have been
-  // called with, each behind a bar: "|run|gimbal.toml". Empty where no answer comes within a
+  // Types `keys` and a return, where the command is `sinerig`: the arguments that it would have
+  // been called with, each behind a bar: "|run|gimbal.toml". Empty where no answer comes within a
   // minute.
   std::string arguments_after(const std::string& keys);
 
