@@ -37,9 +37,9 @@ void print_comparison(std::ostream& stream, const std::string& first,
     stream << text("%14s %12s %10s %12s %10s %10s\n", "Hz", "gain dB", "± dB", "phase °", "± °",
                    "p");
     for (const PointDifference& point : difference.points) {
-      stream << text("%14.6f %+12.4f %10.2g %+12.3f %10.2g %10.2g  %s\n", point.frequency_hz,
+      stream << text("%14.6f %+12.4f %10.2g %+12.3f %10.2g %10.2g%s\n", point.frequency_hz,
                      point.gain_db, point.gain95_db, point.phase_deg, point.phase95_deg,
-                     point.probability, point.changed ? "changed" : "");
+                     point.probability, point.changed ? "  changed" : "");
     }
     if (!difference.points.empty()) {
       const auto largest = std::max_element(

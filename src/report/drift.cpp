@@ -56,10 +56,10 @@ void print_drift(std::ostream& stream, const std::string& first, const Drift& dr
                  drift.name.substr(0, 12).c_str(), "change", "±", "p");
   for (const DriftFigure& figure : drift.figures) {
     const std::string name = figure.name + (figure.unit.empty() ? "" : ", " + figure.unit);
-    stream << text("%-28s %12.6g %12.6g %+12.4g %10.2g %10.2g  %s\n", name.c_str(), figure.first,
+    stream << text("%-28s %12.6g %12.6g %+12.4g %10.2g %10.2g%s\n", name.c_str(), figure.first,
                    figure.other, figure.change, figure.change95, figure.probability,
-                   gone(figure)     ? "in one only"
-                   : figure.changed ? "changed"
+                   gone(figure)     ? "  in one only"
+                   : figure.changed ? "  changed"
                                     : "");
   }
   stream << (drift.changed() ? "changed: the model by more than its intervals explain"
