@@ -196,6 +196,11 @@ TEST_F(Page, ShowsAModelWithItsResidual) {
       browser_->evaluate("document.querySelector('#residual-gain .outside').getAttribute('d')"),
       "");
   EXPECT_TRUE(browser_->evaluate("!!document.querySelector('#poles-0 svg')").get<bool>());
+  // A scale needs two labels at least.
+  EXPECT_GE(browser_->evaluate("document.querySelectorAll('#residual-gain text[text-anchor=end]')"
+                               ".length - 1")
+                .get<int>(),
+            2);
   keep_picture("model");
   expect_no_errors();
 }

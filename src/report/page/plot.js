@@ -149,7 +149,9 @@ class Plot {
       major = linearTicks(y.lo, y.hi, step);
       label = state.degrees ? linearLabel(step) : radianLabel;
     } else {
-      const step = niceStep(y.hi - y.lo, rows);
+      let step = niceStep(y.hi - y.lo, rows);
+      // A single label says nothing of the scale.
+      if (linearTicks(y.lo, y.hi, step).length < 3) step = niceStep(y.hi - y.lo, 2 * rows);
       major = linearTicks(y.lo, y.hi, step);
       label = linearLabel(step);
     }
