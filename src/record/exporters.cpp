@@ -138,8 +138,9 @@ Json timing_json(const StoredRun& run) {
   return timings;
 }
 
-// What the names of the columns leave open, as the last name: a line of its own would be a row, or
-// an error, to most programs that read CSV. No comma in it, which would end it.
+// What the names of the columns leave open, as the last name, over a column that says what Y/U is:
+// a line of its own would be a row, or an error, to most programs that read CSV, and an empty
+// column is one to Octave's importdata. No comma in it, which would end it.
 std::string legend(const ChannelInfo& input, const ChannelInfo& output) {
   const auto unit = [](const ChannelInfo& channel) {
     return channel.unit.empty() ? "1" : channel.unit;
@@ -170,7 +171,8 @@ void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse&
     }
     for (const PointColumn& column : point_columns) stream << field(point.*column.value) << ',';
     stream << point.status << ',' << point.reason << ',' << point.settled_by << ',' << input.name
-           << ',' << output.name << ',' << input.unit << ',' << output.unit << ",\n";
+           << ',' << output.name << ',' << input.unit << ',' << output.unit << ',' << output.name
+           << '/' << input.name << '\n';
   }
 }
 

@@ -44,12 +44,12 @@ struct Setting {
   ClientKind kind;
   int clients;  // -1: as many as were asked for
 };
-constexpr std::array settings{Setting{"no live page", false, ClientKind::none, 0},
-                              Setting{"nobody looks", true, ClientKind::none, 0},
-                              Setting{"one that stalls", true, ClientKind::stall, 1},
-                              Setting{"all watch", true, ClientKind::watch, -1},
-                              Setting{"all stall", true, ClientKind::stall, -1},
-                              Setting{"all misbehave", true, ClientKind::misbehave, -1}};
+constexpr std::array contenders{Setting{"no live page", false, ClientKind::none, 0},
+                                Setting{"nobody looks", true, ClientKind::none, 0},
+                                Setting{"one that stalls", true, ClientKind::stall, 1},
+                                Setting{"all watch", true, ClientKind::watch, -1},
+                                Setting{"all stall", true, ClientKind::stall, -1},
+                                Setting{"all misbehave", true, ClientKind::misbehave, -1}};
 
 struct Seen {
   bench::Rounds rounds;
@@ -172,12 +172,12 @@ int compare(const Options& options) {
       (std::filesystem::temp_directory_path() / ("sinerig-bench-" + std::to_string(getpid())))
           .string() +
       ".sweep";
-  std::array<Seen, settings.size()> seen;
+  std::array<Seen, contenders.size()> seen;
   const double before = load_average();
   for (int round = 0; round < options.rounds; ++round) {
-    for (std::size_t i = 0; i < settings.size(); ++i) {
-      const std::size_t turn = (i + static_cast<std::size_t>(round)) % settings.size();
-      Run{options, settings[turn], sweep_file}.add_to(seen[turn]);
+    for (std::size_t i = 0; i < contenders.size(); ++i) {
+      const std::size_t turn = (i + static_cast<std::size_t>(round)) % contenders.size();
+      Run{options, contenders[turn], sweep_file}.add_to(seen[turn]);
     }
   }
   std::filesystem::remove(sweep_file);
@@ -186,9 +186,9 @@ int compare(const Options& options) {
   std::printf("%-16s %9s %9s %9s %9s   %s\n", "late by, µs", "p50", "p99", "p99.9", "most",
               "times that without a page, 95 % interval");
   int missed = 0;
-  for (std::size_t i = 0; i < settings.size(); ++i) {
+  for (std::size_t i = 0; i < contenders.size(); ++i) {
     const realtime::LatencyHistogram whole = bench::merged(seen[i].rounds);
-    std::printf("%-16s", settings[i].name);
+    std::printf("%-16s", contenders[i].name);
     for (const double part : bench::parts) std::printf(" %9.1f", bench::quantile_us(whole, part));
     std::printf(" %9.0f  ", whole.max_us());
     if (i > 0) {

@@ -59,7 +59,6 @@ constexpr Line completed_everywhere[] = {
     {"sinerig night my\t", "|night|my night.toml"},
     {"sinerig report gim\t", "|report|gimbal.sweep"},
     {"sinerig resume gim\t", "|resume|gimbal.sweep"},
-    {"sinerig run geo\t", "|run|geometry/"},
     {"sinerig completion f\t", "|completion|fish"},
     {"sinerig export --format \x14", "|export|--format|csv|json|mat|snippet|uff"},
     {"sinerig co\x14", "|compare|completion"},
@@ -72,6 +71,7 @@ TEST_F(Completion, BashCompletesAtItsPrompt) {
   bash.run("source ./sinerig.bash");
   bash.run("bind '\"\\C-t\": insert-completions'");
   expect_lines(bash, completed_everywhere);
+  EXPECT_EQ(bash.arguments_after("sinerig run geo\t"), "|run|geometry/");
   EXPECT_EQ(bash.arguments_after("sinerig doctor --\x14"),
             "|doctor|--help|--json|--log-level|--seconds|--strict");
 }
@@ -86,6 +86,8 @@ TEST_F(Completion, ZshCompletesAtItsPrompt) {
                            "zstyle ':completion:all-matches:*' insert true"})
     zsh.run(line);
   expect_lines(zsh, completed_everywhere);
+  // Its slash goes when the line is done.
+  EXPECT_EQ(zsh.arguments_after("sinerig run geo\t"), "|run|geometry");
   EXPECT_EQ(zsh.arguments_after("sinerig doctor --\x14"),
             "|doctor|--help|--json|--log-level|--seconds|--strict");
 }

@@ -60,7 +60,7 @@ TEST(RunningEstimate, KeepsToItsTone) {
   RunningEstimate second{1, 2, 1};
   add(second, 0, {1.0, 0.0}, {5.0, 0.0});
   EXPECT_FALSE(second.value());
-  for (const std::uint16_t channel : {1, 2}) {
+  for (const std::uint16_t channel : {std::uint16_t{1}, std::uint16_t{2}}) {
     Block block = block_of(0, channel, {channel == 1 ? 0.5 : 1.5, 0.0});
     block.tone = 1;
     second.add(block);
