@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -39,12 +40,14 @@ class LivePage : public testing::Test {
     browser_ = std::make_unique<test::Browser>(*program);
   }
 
-  explicit LivePage(SweepPlan plan = test::served_plan(points)) : plan_{std::move(plan)} {}
+  explicit LivePage(SweepPlan plan = test::served_plan(points),
+                    sim::SimulatedRigSettings rig = test::served_rig())
+      : plan_{std::move(plan)}, rig_{std::move(rig)} {}
 
   // The whole run, its records kept to be told bit by bit.
   void play() {
     VirtualClock clock{TickGrid{plan_.rate_hz}};
-    sim::SimulatedRig rig{test::served_rig(), clock};
+    sim::SimulatedRig rig{rig_, clock};
     Sensor* const sensors[] = {&rig.sensor(0)};
     Guard guard{test::served_limits(), clock.grid().period_s()};
     RunnerSettings settings;
@@ -81,6 +84,7 @@ class LivePage : public testing::Test {
   void expect_no_errors() { EXPECT_TRUE(browser_->errors().empty()) << browser_->errors().front(); }
 
   SweepPlan plan_;
+  sim::SimulatedRigSettings rig_;
   Lateness lateness_;
   RunControl control_;
   RecordLog log_;
@@ -167,14 +171,20 @@ SweepPlan coarse_plan() {
   sweep.points = 6;
   sweep.tones = 2;
   sweep.refine_points = 3;
-  sweep.refine_db = 1e-4;
   sweep.amplitude = 0.4;
   return plan_sweep(sweep, {}, 1000.0);
 }
 
+sim::SimulatedRigSettings resonant_rig() {
+  sim::SimulatedRigSettings rig = test::served_rig();
+  const double omega = 2.0 * std::numbers::pi * 17.0;
+  rig.system = sim::from_transfer_function({omega * omega}, {1.0, 0.3 * omega, omega * omega});
+  return rig;
+}
+
 class CoarseLivePage : public LivePage {
  protected:
-  CoarseLivePage() : LivePage{coarse_plan()} {}
+  CoarseLivePage() : LivePage{coarse_plan(), resonant_rig()} {}
 };
 
 TEST_F(CoarseLivePage, ShowsEveryToneAndNamesWhatRefinementAdds) {

@@ -51,8 +51,10 @@ class Nyquist {
     const keep = shown.map(r => this.inRange(r));
     const res = shown.flatMap((r, k) => keep[k].map(i => r.re[i])),
       ims = shown.flatMap((r, k) => keep[k].map(i => r.im[i]));
-    let [x0, x1] = extent(state.range ? res : res.concat(0), false),
-      [y0, y1] = extent(state.range ? ims : ims.concat(0), false);
+    // The origin belongs to it; without a point there is no scale that could be right.
+    const withOrigin = values => (state.range || !values.length ? values : values.concat(0));
+    let [x0, x1] = extent(withOrigin(res), false),
+      [y0, y1] = extent(withOrigin(ims), false);
     const w = width - m.left - m.right,
       h = height - m.top - m.bottom;
     const k = Math.max((x1 - x0) / w, (y1 - y0) / h);
