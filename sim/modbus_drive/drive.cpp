@@ -109,9 +109,8 @@ void Drive::become(State state, std::int64_t time_ns) {
   if (state == state_) return;
   state_ = state;
   if (changes_.size() == most_changes) return;
-  changes_.push_back({.time_ns = time_ns,
-                      .state = state,
-                      .set_point = get(set_point_at, settings_.torque_scale)});
+  changes_.push_back(
+      {.time_ns = time_ns, .state = state, .set_point = get(set_point_at, settings_.torque_scale)});
 }
 
 void Drive::lose_power(std::int64_t now_ns) {

@@ -20,7 +20,8 @@ class DriveServer {
 
   std::string address() const { return line_->address(); }
 
-  // When it has been switched on and off or has tripped, a line for each: "on at 0.512300 s, set-point 0".
+  // When it has been switched on and off or has tripped, a line for each: "on at 0.512300 s,
+  // set-point 0".
   std::string account() const;
 
   // Until `stop` or for `seconds`. A stop is noticed within `patience_s`.
