@@ -79,6 +79,7 @@ int main(int count, char** arguments) {
     sim::ServoDevice device{servo()};
     std::atomic<bool> stop{false};
     std::thread drive{[&] {
+      realtime::enter({.priority = bench::priority_of_a_device});
       while (!stop.load()) device.run_once(10'000'000);
     }};
     int exit_code = 0;

@@ -6,15 +6,19 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <optional>
+#include <string>
 #include <vector>
 
 #include "drivers/driver.h"
 #include "drivers/monotonic_time.h"
 #include "realtime/loop_thread.h"
+#include "realtime/thread_rights.h"
 #include "sweep/clock.h"
 
 namespace sinerig::bench {
+
+// In life it has a processor of its own: here it goes before the loop, where there is the right.
+inline constexpr int priority_of_a_device = 90;
 
 class LatencyTable {
  public:

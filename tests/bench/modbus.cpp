@@ -35,6 +35,7 @@ int main(int count, char** arguments) {
   sim::DriveServer server{drive};
   std::atomic<bool> stop{false};
   std::thread device{[&] {
+    realtime::enter({.priority = bench::priority_of_a_device});
     server.run(stop, 1e9, 0.01);
   }};
 
