@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <sched.h>
 #include <thread>
@@ -207,6 +208,17 @@ TEST_P(ModbusLink, ReleaseWritesNeutralAndDisarmsWhateverWasHandedOver) {
   EXPECT_EQ(number(number_at(16)), 0.0);
   EXPECT_EQ(number(number_at(42)), 0.0);
   EXPECT_EQ(number(word_at(32)), 0.0);
+}
+
+TEST_P(ModbusLink, ACommandThatIsNoNumberWritesNeutral) {
+  Rig rig{drive_settings(GetParam())};
+  rig.open();
+  rig.actuator->arm();
+  while (rig.tick(3.0).value != 3.0) {
+  }
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(rig.actuator->write(none).fault, Fault::range);
+  while (rig.torque->read().value != 0.0) rig.tick(none);
 }
 
 TEST_P(ModbusLink, ADriveWithoutFunction23IsWrittenAndReadByTwoQuestions) {
