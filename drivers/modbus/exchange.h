@@ -72,6 +72,7 @@ struct Exchange {
   double command = 0.0;  // what the registers mean, engineering unit
   std::int64_t command_ns = 0;
   std::uint8_t exception = 0;
+  bool withheld = false;  // something was not read: a late answer could be taken for it
   std::array<Sample, max_fields> fields{};
 };
 

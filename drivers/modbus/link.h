@@ -16,8 +16,10 @@
 
 #include "drivers/mailbox.h"
 #include "drivers/modbus/exchange.h"
+#include "drivers/modbus/pace.h"
 #include "drivers/modbus/sequence.h"
 #include "drivers/modbus/transport.h"
+#include "realtime/rights.h"
 #include "sweep/nonblocking.h"
 
 namespace sinerig::modbus {
@@ -28,15 +30,8 @@ struct LinkSettings {
   std::int64_t period_ns = 0;            // of the loop
   std::int64_t response_timeout_ns = 0;  // of a whole exchange
   std::size_t read_through = 0;
-};
-
-// How long exchanges take: of those since the last summary.
-struct Pace {
-  std::size_t exchanges = 0;
-  std::size_t failed = 0;
-  std::int64_t median_ns = 0;
-  std::int64_t slow_ns = 0;  // 95 % take less
-  std::int64_t worst_ns = 0;
+  // Of the loop in real time: the thread runs one priority below it. Nothing: an ordinary thread.
+  std::optional<realtime::Settings> loop;
 };
 
 class Link {
@@ -63,12 +58,16 @@ class Link {
   // Where the connection is gone, outside the loop. Throws std::runtime_error.
   void reconnect();
 
-  // Exchanges as in the loop, outside of it; with a command where one is given. Falls back from
-  // function 23 to 16 where the device does not know it and the rig file leaves the choice.
+  // Exchanges as in the loop, outside of it; with a command where one is given. Those that ask for
+  // nothing, because a late answer may still come, don't count. Falls back from function 23 to 16
+  // where the device does not know it and the rig file leaves the choice.
   Pace try_out(std::optional<double> command, std::size_t exchanges);
   std::string last_failure() const;
   Pace pace() const;  // of the loop so far
   TransportCounters counters() const;
+
+  // After open(): how the thread runs.
+  const std::optional<realtime::Grant>& scheduling() const noexcept { return scheduling_; }
 
   // From now on ticks carry a command, and only they pace the exchanges.
   void set_commanded(bool commanded) noexcept { commanded_ = commanded; }
@@ -99,11 +98,8 @@ class Link {
   void perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept;
   void make_plans();
   void find_spare_registers();
-  void note_duration(const Exchange& exchange, bool failed) noexcept;
   void reconnect_now_and_then() noexcept;
-  Pace summary(std::vector<std::int64_t> durations, std::size_t failed) const;
 
-  static constexpr std::size_t kept_durations = 4096;
   static constexpr std::int64_t reconnect_period_ns = 100'000'000;
 
   LinkSettings settings_;
@@ -129,14 +125,13 @@ class Link {
   ExchangePlan reading_plan_;
   ExchangePlan commanding_plan_;
   std::array<std::uint16_t, max_read_registers> registers_{};
-  std::vector<std::int64_t> durations_;
-  std::size_t next_duration_ = 0;
-  std::size_t failed_ = 0;
+  PaceRecord pace_;
   Answer failure_;
   bool has_failed_ = false;
   std::int64_t next_reconnect_ns_ = 0;
 
   int wake_ = -1;
+  std::optional<realtime::Grant> scheduling_;
   std::atomic<bool> stop_{false};
   std::thread thread_;
 };

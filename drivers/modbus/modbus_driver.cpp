@@ -16,8 +16,10 @@ constexpr std::size_t trial_readings = 100;
 class ModbusDevice final : public Device {
  public:
   explicit ModbusDevice(const DeviceRequest& request) {
-    for (const Section& section : request.rig.file->children("modbus"))
+    for (const Section& section : request.rig.file->children("modbus")) {
       connections_.push_back(read_connection(section, request.rig.rate_hz));
+      connections_.back().link.loop = request.rig.realtime;
+    }
     if (request.actuator != nullptr) {
       const Section& section = request.actuator->section;
       command_connection_ = connection_of(section);
@@ -85,6 +87,10 @@ class ModbusDevice final : public Device {
     std::vector<Remark> remarks;
     for (std::size_t n = 0; n < links_.size(); ++n) {
       remarks.push_back({.text = summary(*links_[n])});
+      if (const auto& grant = links_[n]->scheduling(); grant && !grant->granted)
+        remarks.push_back({.text = "modbus " + links_[n]->settings().connection.name +
+                                   ": its thread has not the loop's rights: " + grant->state +
+                                   "; " + grant->remedy});
       if (const std::string what = obstacle(*links_[n], trials_[n]); !what.empty())
         remarks.push_back({.text = what, .stops_a_sweep = true});
     }

@@ -21,7 +21,6 @@ namespace {
 constexpr std::size_t tcp_header_bytes = 7;
 constexpr std::size_t crc_bytes = 2;
 constexpr std::int64_t ns_per_s = 1'000'000'000;
-constexpr std::uint32_t connect_timeout_us = 300'000;
 constexpr std::int64_t echo_wait_ns = 300'000'000;
 constexpr std::int64_t echo_quiet_ns = 50'000'000;
 
@@ -43,78 +42,6 @@ bool wait_for_input(int fd, std::int64_t until_ns) noexcept {
 }
 
 }  // namespace
-
-void Transport::Close::operator()(modbus_t* context) const noexcept {
-  modbus_close(context);
-  modbus_free(context);
-}
-
-Transport::Transport(ConnectionSettings settings) : settings_{std::move(settings)} {}
-
-Transport::~Transport() = default;
-
-int Transport::socket() const noexcept {
-  return modbus_get_socket(context_.get());
-}
-
-void Transport::disconnect() noexcept {
-  context_.reset();
-  connected_ = false;
-}
-
-bool Transport::try_connect() noexcept {
-  disconnect();
-  if (settings_.serial) {
-    context_.reset(modbus_new_rtu(settings_.device.c_str(), settings_.baud, settings_.parity, 8,
-                                  settings_.stop_bits));
-  } else {
-    context_.reset(
-        modbus_new_tcp_pi(settings_.host.c_str(), std::to_string(settings_.port).c_str()));
-  }
-  if (!context_) return false;
-  modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
-  modbus_set_response_timeout(context_.get(), 0, connect_timeout_us);
-  // Without a time-out between bytes the response time-out covers the whole answer.
-  modbus_set_byte_timeout(context_.get(), 0, 0);
-  if (modbus_connect(context_.get()) != 0) {
-    const int error = errno;
-    context_.reset();
-    errno = error;
-    return false;
-  }
-  if (settings_.serial && settings_.rs485 != Rs485::adapter) {
-    const bool by_kernel = settings_.rs485 == Rs485::kernel;
-    const int done = by_kernel ? modbus_rtu_set_serial_mode(context_.get(), MODBUS_RTU_RS485)
-                               : modbus_rtu_set_rts(context_.get(), settings_.rs485 == Rs485::rts_up
-                                                                        ? MODBUS_RTU_RTS_UP
-                                                                        : MODBUS_RTU_RTS_DOWN);
-    if (done != 0) {
-      const int error = errno;
-      context_.reset();
-      errno = error;
-      return false;
-    }
-  }
-  connected_ = true;
-  late_.fill({});
-  ++counters_.connections;
-  return true;
-}
-
-void Transport::connect() {
-  if (try_connect()) return;
-  const int error = errno;
-  const std::string where = "[modbus." + settings_.name + "] " + settings_.address() + ": ";
-  const std::string why = modbus_strerror(error);
-  if (!settings_.serial)
-    throw std::runtime_error(where + "no connection (" + why +
-                             "): is the device on, are host and port right?");
-  if (settings_.rs485 == Rs485::kernel && (error == ENOTTY || error == EINVAL))
-    throw std::runtime_error(where + "this serial port has no RS-485 mode (" + why +
-                             "); adapters that switch by themselves need rs485 = \"adapter\"");
-  throw std::runtime_error(where + "cannot be opened (" + why +
-                           "): is the adapter plugged in, are you in the group dialout?");
-}
 
 std::int64_t Transport::wire_ns(std::size_t bytes) const noexcept {
   if (!settings_.serial) return 0;
@@ -139,34 +66,7 @@ void Transport::take_in_late_answers() noexcept {
   if (!settings_.serial || pending() == 0) return;
   clear_input();
   ++counters_.late_answers;
-  const std::int64_t now_ns = monotonic_now_ns();
-  const auto due = [&](const Late& late) {
-    return late.until_ns > now_ns;
-  };
-  if (std::ranges::count_if(late_, due) == 1) late_.fill({});
-}
-
-bool Transport::could_be_mistaken(const Request& request) const noexcept {
-  const std::int64_t now_ns = monotonic_now_ns();
-  return request.reads() && std::ranges::any_of(late_, [&](const Late& late) {
-           return late.until_ns > now_ns && late.size == reply_size(request) &&
-                  late.function == static_cast<std::uint8_t>(request.function);
-         });
-}
-
-void Transport::expect_late(const Request& request, std::int64_t until_ns) noexcept {
-  Late& oldest = *std::ranges::min_element(late_, {}, &Late::until_ns);
-  oldest = {.function = static_cast<std::uint8_t>(request.function),
-            .size = reply_size(request),
-            .until_ns = until_ns};
-}
-
-void Transport::forget_late(std::span<const std::uint8_t> pdu) noexcept {
-  for (Late& late : late_) {
-    if (late.until_ns == 0 || late.size != pdu.size() || late.function != pdu[0]) continue;
-    late = {};
-    return;
-  }
+  late_.one_came(monotonic_now_ns());
 }
 
 bool Transport::send(const RequestBytes& request) noexcept {
@@ -194,10 +94,10 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
   }
   Request request = wanted;
   take_in_late_answers();
-  if (could_be_mistaken(request)) {
+  if (settings_.serial && late_.could_be(request, monotonic_now_ns())) {
     answer.outcome = Outcome::timeout;
+    answer.withheld = true;
     if (!request.writes()) return answer;
-    answer.write_only = true;
     request.function = Function::write_multiple;
     request.read_count = 0;
   }
@@ -226,8 +126,8 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
 
   const bool answered = answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
   if (settings_.serial && !answered)
-    expect_late(request,
-                answer.received_ns + latest_answer * std::max<std::int64_t>(0, patience_ns));
+    late_.expect(request,
+                 answer.received_ns + latest_answer * std::max<std::int64_t>(0, patience_ns));
   if (answer.outcome == Outcome::timeout) ++counters_.timeouts;
   if (answer.outcome == Outcome::exception) ++counters_.exceptions;
   if (answer.outcome == Outcome::spoiled) {
@@ -265,7 +165,7 @@ void Transport::receive(const Request& request, std::int64_t deadline_ns,
     const Reply reply = ours ? read_reply(pdu, request, registers) : Reply{};
     if (reply.kind == ReplyKind::other) {
       ++counters_.late_answers;
-      forget_late(pdu);
+      late_.forget(pdu);
       continue;
     }
     answer.exception = reply.exception;
@@ -309,7 +209,7 @@ void Transport::look_for_echo(const Request& request) noexcept {
     std::array<std::uint8_t, 64> rest{};
     if (read(socket(), rest.data(), rest.size()) <= 0) break;
   }
-  late_.fill({});
+  late_.clear();
 }
 
 std::string Transport::describe(const Answer& answer) const {

@@ -13,6 +13,7 @@
 #include <span>
 #include <string>
 
+#include "drivers/modbus/late_answers.h"
 #include "drivers/modbus/request.h"
 
 struct _modbus;
@@ -48,8 +49,10 @@ enum class Outcome : std::uint8_t {
 struct Answer {
   Outcome outcome = Outcome::disconnected;
   std::uint8_t exception = 0;
-  bool write_only = false;  // nothing was read: a late answer may still be under way
-  int error = 0;            // errno of libmodbus
+  // Nothing was read, and where nothing was to be written nothing asked: a late answer may still be
+  // under way.
+  bool withheld = false;
+  int error = 0;  // errno of libmodbus
   std::int64_t sent_ns = 0;
   std::int64_t received_ns = 0;
   std::int64_t time_ns = 0;  // middle of when the device can have acted
@@ -98,14 +101,12 @@ class Transport {
     void operator()(_modbus* context) const noexcept;
   };
 
+  bool switch_transmitter() noexcept;
   bool send(const RequestBytes& request) noexcept;
   void receive(const Request& request, std::int64_t deadline_ns, std::span<std::uint16_t> registers,
                Answer& answer) noexcept;
   bool discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept;
   void take_in_late_answers() noexcept;
-  bool could_be_mistaken(const Request& request) const noexcept;
-  void expect_late(const Request& request, std::int64_t until_ns) noexcept;
-  void forget_late(std::span<const std::uint8_t> pdu) noexcept;
   void clear_input() noexcept;
   int pending() const noexcept;
   int socket() const noexcept;
@@ -116,14 +117,7 @@ class Transport {
   std::uint16_t transaction_ = 0;
   bool connected_ = false;
   bool echoes_ = false;
-
-  // Serial: answers that may still come, by what tells them apart.
-  struct Late {
-    std::uint8_t function = 0;
-    std::size_t size = 0;
-    std::int64_t until_ns = 0;
-  };
-  std::array<Late, 8> late_{};
+  LateAnswers late_;  // serial lines
 };
 
 }  // namespace sinerig::modbus

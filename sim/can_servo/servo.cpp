@@ -38,6 +38,7 @@ ServoSettings read_servo(config::RigFile& file) {
     wrong.silent_at_s = faults->number("silent_at_s", zero_or_more, 0.0);
     wrong.power_cycle_at_s = faults->number("power_cycle_at_s", zero_or_more, 0.0);
     wrong.bus_off_at_s = faults->number("bus_off_at_s", zero_or_more, 0.0);
+    wrong.bus_off_for_s = faults->number("bus_off_for_s", zero_or_more, 0.0);
     wrong.error_at_s = faults->number("error_at_s", zero_or_more, 0.0);
     wrong.seed = static_cast<std::uint64_t>(faults->integer("seed", {.min = 0.0, .max = 9e15}, 1));
   }

@@ -18,7 +18,8 @@ struct ServoFaults {
   double late_max_s = 0.0;      // each reply is late by up to this
   double silent_at_s = 0.0;     // from then on nothing is said; 0 = never
   double power_cycle_at_s = 0;  // forgets everything and boots for half a second; 0 = never
-  double bus_off_at_s = 0.0;    // the controller reports bus-off; 0 = never
+  double bus_off_at_s = 0.0;    // the controller reports bus-off; 0 = never …
+  double bus_off_for_s = 0.0;   // … and its restart so much later; 0 = never
   double error_at_s = 0.0;      // the drive trips; 0 = never
   std::uint64_t seed = 1;
 };
@@ -49,8 +50,8 @@ class Wire {
   // Sends now, later or never, as the faults say.
   void reply(const can::Frame& frame, std::int64_t now_ns);
 
-  // From now on nothing reaches the host.
-  void cut() noexcept { cut_ = true; }
+  // While it is cut nothing reaches the host.
+  void cut(bool cut) noexcept { cut_ = cut; }
 
   // Sends what has become due; returns when the next is, or INT64_MAX.
   std::int64_t send_due(std::int64_t now_ns);

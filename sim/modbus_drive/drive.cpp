@@ -105,8 +105,21 @@ double Drive::get(std::size_t first, double scale) const {
   return decoded(settings_.type, bytes) * scale;
 }
 
-void Drive::stop(State state, std::uint16_t error, std::int64_t time_ns) {
+void Drive::become(State state, std::int64_t time_ns) {
+  if (state == state_) return;
   state_ = state;
+  if (changes_.size() == most_changes) return;
+  changes_.push_back(
+      {.time_ns = time_ns, .state = state, .set_point = get(set_point_at, settings_.torque_scale)});
+}
+
+void Drive::lose_power(std::int64_t now_ns) {
+  stop(off, none, now_ns);
+  registers_.fill(0);
+}
+
+void Drive::stop(State state, std::uint16_t error, std::int64_t time_ns) {
+  become(state, time_ns);
   error_ = error;
   motor_.apply(0.0, time_ns);
 }
@@ -131,7 +144,7 @@ std::uint8_t Drive::write(std::size_t first, std::span<const std::uint8_t> words
   if (first == control_at) {
     if (registers_[control_at] > 2) return illegal_value;
     if (registers_[control_at] == 0) stop(state_ == tripped ? tripped : off, error_, time_ns);
-    if (registers_[control_at] == 1 && state_ == off) state_ = on_;
+    if (registers_[control_at] == 1 && state_ == off) become(on_, time_ns);
     if (registers_[control_at] == 2 && state_ == tripped) stop(off, none, time_ns);
     return 0;
   }

@@ -34,19 +34,24 @@ class Drive {
 
   void watch(std::int64_t now_ns);  // trips when requests have ceased
   void trip(std::int64_t now_ns) { stop(tripped, failed, now_ns); }
-  void lose_power(std::int64_t now_ns) {
-    stop(off, none, now_ns);
-    registers_.fill(0);
-  }
+  void lose_power(std::int64_t now_ns);
 
-  double torque() const { return motor_.torque(); }
-  bool on() const { return state_ == State::on_; }
+  enum State : std::uint16_t { off = 0, on_ = 1, tripped = 2 };
+
+  // What it has become, when, and the set-point in its registers then, Nm. The first thousand.
+  struct Change {
+    std::int64_t time_ns = 0;
+    State state = off;
+    double set_point = 0.0;
+  };
+  const std::vector<Change>& changes() const { return changes_; }
 
  private:
-  enum State : std::uint16_t { off = 0, on_ = 1, tripped = 2 };
   enum Error : std::uint16_t { none = 0, watchdog = 1, failed = 2 };
   static constexpr std::size_t count = 64;
+  static constexpr std::size_t most_changes = 1000;
 
+  void become(State state, std::int64_t time_ns);
   void stop(State state, std::uint16_t error, std::int64_t time_ns);
   bool writable(std::size_t first, std::size_t words) const;
   std::uint8_t write(std::size_t first, std::span<const std::uint8_t> words, std::int64_t time_ns);
@@ -61,6 +66,7 @@ class Drive {
   State state_ = off;
   std::uint16_t error_ = none;
   std::int64_t last_request_ns_;
+  std::vector<Change> changes_;
 };
 
 }  // namespace sinerig::sim

@@ -1,5 +1,5 @@
 // modbus_drive DEVICE.toml : a simulated Modbus drive, TCP or RTU on a pseudo-terminal, until it is
-// killed or --for SECONDS.
+// killed or --for SECONDS. At its end it prints when it was on.
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -34,6 +34,7 @@ int main(int count, char** arguments) {
     std::printf("on %s\n", server.address().c_str());
     std::fflush(stdout);
     server.run(stop_requested, bounded ? std::strtod(arguments[3], nullptr) : 1e9);
+    std::fputs(server.account().c_str(), stdout);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "modbus_drive: %s\n", error.what());
     return 1;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <utility>
 
@@ -25,6 +26,18 @@ DriveServer::DriveServer(DriveSettings settings)
       start_ns_{monotonic_now_ns()},
       drive_{settings_, start_ns_},
       random_{settings_.faults.seed} {}
+
+std::string DriveServer::account() const {
+  static constexpr const char* states[] = {"off", "on", "tripped"};
+  std::string text;
+  for (const Drive::Change& change : drive_.changes()) {
+    char line[96];
+    std::snprintf(line, sizeof line, "%s at %.6f s, set-point %g\n", states[change.state],
+                  static_cast<double>(change.time_ns - start_ns_) * 1e-9, change.set_point);
+    text += line;
+  }
+  return text;
+}
 
 bool DriveServer::chance(double fraction) {
   return fraction > 0.0 && std::uniform_real_distribution<double>{}(random_) < fraction;

@@ -20,6 +20,10 @@ class DriveServer {
 
   std::string address() const { return line_->address(); }
 
+  // When it has been switched on and off or has tripped, a line for each: "on at 0.512300 s,
+  // set-point 0".
+  std::string account() const;
+
   // Until `stop` or for `seconds`. A stop is noticed within `patience_s`.
   void run(const std::atomic<bool>& stop, double seconds, double patience_s = 1.0);
 

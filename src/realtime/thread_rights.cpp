@@ -89,6 +89,13 @@ Grants enter(const Settings& settings) {
   return grants;
 }
 
+Grant follow(const Settings& loop) {
+  if (loop.priority > 1) return ask_for_priority(loop.priority - 1);
+  return {.right = Right::scheduling,
+          .state = "ordinary: no priority is below the loop's, 1",
+          .remedy = "set [loop] priority to 2 or more"};
+}
+
 void leave() noexcept {
   const sched_param none{.sched_priority = 0};
   sched_setscheduler(0, SCHED_OTHER, &none);

@@ -1,0 +1,99 @@
+// How a connection is made and ended; transport.cpp asks and waits on it.
+#include <cerrno>
+#include <stdexcept>
+#include <utility>
+
+#include <modbus/modbus.h>
+#include <sys/ioctl.h>
+
+#include "drivers/modbus/transport.h"
+
+namespace sinerig::modbus {
+namespace {
+
+constexpr std::uint32_t connect_timeout_us = 300'000;
+
+}  // namespace
+
+void Transport::Close::operator()(modbus_t* context) const noexcept {
+  modbus_close(context);
+  modbus_free(context);
+}
+
+Transport::Transport(ConnectionSettings settings) : settings_{std::move(settings)} {}
+
+Transport::~Transport() = default;
+
+int Transport::socket() const noexcept {
+  return modbus_get_socket(context_.get());
+}
+
+void Transport::disconnect() noexcept {
+  context_.reset();
+  connected_ = false;
+}
+
+bool Transport::try_connect() noexcept {
+  disconnect();
+  if (settings_.serial) {
+    context_.reset(modbus_new_rtu(settings_.device.c_str(), settings_.baud, settings_.parity, 8,
+                                  settings_.stop_bits));
+  } else {
+    context_.reset(
+        modbus_new_tcp_pi(settings_.host.c_str(), std::to_string(settings_.port).c_str()));
+  }
+  if (!context_) return false;
+  modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
+  modbus_set_response_timeout(context_.get(), 0, connect_timeout_us);
+  // Without a time-out between bytes the response time-out covers the whole answer.
+  modbus_set_byte_timeout(context_.get(), 0, 0);
+  if (modbus_connect(context_.get()) != 0) {
+    const int error = errno;
+    context_.reset();
+    errno = error;
+    return false;
+  }
+  if (settings_.serial && !switch_transmitter()) {
+    const int error = errno;
+    context_.reset();
+    errno = error;
+    return false;
+  }
+  connected_ = true;
+  late_.clear();
+  ++counters_.connections;
+  return true;
+}
+
+// False, and errno, where the port cannot switch it as the rig file says.
+bool Transport::switch_transmitter() noexcept {
+  if (settings_.rs485 == Rs485::adapter) return true;
+  if (settings_.rs485 == Rs485::kernel)
+    return modbus_rtu_set_serial_mode(context_.get(), MODBUS_RTU_RS485) == 0;
+  // libmodbus does not look whether there is such a line: the transmitter would never be on.
+  int lines = 0;
+  if (ioctl(socket(), TIOCMGET, &lines) != 0) return false;
+  const bool up = settings_.rs485 == Rs485::rts_up;
+  return modbus_rtu_set_rts(context_.get(), up ? MODBUS_RTU_RTS_UP : MODBUS_RTU_RTS_DOWN) == 0;
+}
+
+void Transport::connect() {
+  if (try_connect()) return;
+  const int error = errno;
+  const std::string where = "[modbus." + settings_.name + "] " + settings_.address() + ": ";
+  const std::string why = modbus_strerror(error);
+  if (!settings_.serial)
+    throw std::runtime_error(where + "no connection (" + why +
+                             "): is the device on, are host and port right?");
+  const bool refused = error == ENOTTY || error == EINVAL;
+  if (settings_.rs485 == Rs485::kernel && refused)
+    throw std::runtime_error(where + "this serial port has no RS-485 mode (" + why +
+                             "); adapters that switch by themselves need rs485 = \"adapter\"");
+  if (settings_.rs485 != Rs485::adapter && refused)
+    throw std::runtime_error(where + "this serial port has no line RTS (" + why +
+                             "); adapters that switch by themselves need rs485 = \"adapter\"");
+  throw std::runtime_error(where + "cannot be opened (" + why +
+                           "): is the adapter plugged in, are you in the group dialout?");
+}
+
+}  // namespace sinerig::modbus
