@@ -9,9 +9,8 @@
 #include <span>
 #include <vector>
 
-#include "sweep/deputy.h"
 #include "sweep/estimator.h"
-#include "sweep/modal_settling.h"
+#include "sweep/modal_dwell.h"
 #include "sweep/noise_memory.h"
 #include "sweep/nonblocking.h"
 #include "sweep/plan.h"
@@ -80,8 +79,8 @@ class Measurement {
   // Of the dwell that has ended: the model of its transient ended it, or was abandoned because it
   // left more than the noise.
   bool modelled() const noexcept { return by_model_; }
-  bool model_refuted() const noexcept { return refuted_; }
-  const ModePrior& modes() const noexcept { return modal_->prior(); }
+  bool model_refuted() const noexcept { return modal_ && modal_->refuted(); }
+  const ModePrior& modes() const noexcept { return modal_->modes(); }
   bool models() const noexcept { return modal_ && modal_->knows(); }
   // From here on transients are waited for.
   void stop_modelling() noexcept SINERIG_NONBLOCKING {
@@ -102,11 +101,7 @@ class Measurement {
   Interval interval(const Result& result, double scale = 1.0) const noexcept {
     return interval_of(result.estimate.response, result.variance, result.left, scale);
   }
-  std::unique_ptr<Deputy> make_solver(Deputy::Where where);
   void start_modal() noexcept;
-  void begin_modal() noexcept;
-  void hear_verdict() noexcept;
-  void add_modal(Phasor tone, std::span<const Observation> observations) noexcept;
   void take_modal() noexcept;
   void restart() noexcept;
   void end_part() noexcept;
@@ -136,18 +131,8 @@ class Measurement {
   std::vector<TransientMemory> transients_;  // per pair
   std::vector<double> omega_;                // per bin
 
-  // Where transients are modelled.
-  std::unique_ptr<ModalSettling> modal_;
-  std::unique_ptr<ModalStore> store_;
-  std::unique_ptr<Deputy> solver_;
-  std::uint64_t look_count_ = 0;  // samples that it is to look at
-  ModalVerdict verdict_ = ModalVerdict::going_on;
-  bool looking_ = false;     // it has been asked and not yet heard
-  bool waiting_ = false;     // it is busy with what has gone; this dwell begins when it is done
-  bool modal_live_ = false;  // this dwell is still the model's
-  bool by_model_ = false;    // … and it ended it
-  bool refuted_ = false;     // … and it left more than the noise
-  std::uint64_t blind_left_ = 0;
+  std::unique_ptr<ModalDwell> modal_;  // where transients are modelled
+  bool by_model_ = false;              // the model of its transient ended this dwell
 
   const Dwell* dwell_ = nullptr;
   std::uint64_t samples_ = 0;  // since the start or the last disturbance

@@ -30,6 +30,9 @@ constexpr double residual_sigmas = 4.0;
 // A residual of this part of the target, relative to the signal, is harmless.
 constexpr double harmless_part_of_target = 0.003;
 
+// What was applied may hold this part of the target beside its tone, relative to it.
+constexpr double harmonics_part_of_target = 0.1;
+
 // A window that does not determine the tone is waited for until it is this much longer than asked.
 constexpr std::uint64_t patient_windows = 2;
 constexpr std::uint64_t patient_samples = 200;
@@ -42,8 +45,17 @@ constexpr double least_dof = 8.0;
 constexpr double late_sigmas = 2.5;
 constexpr double late_part_of_target = 0.25;
 
+// … where the residual says that they are others: multiplies their variance.
+constexpr double doubted_variance = 100.0;
+
 // What a dwell knows of the poles is a little less sure in the next.
 constexpr double forgetting = 1.05 * 1.05;
+
+// No pole is believed to be known less than this, relative to its decay and frequency: further off
+// the regression says nothing of it.
+constexpr double least_known_real = 0.3;
+constexpr double least_known_decay = 0.6;
+constexpr double least_known_turn = 0.1;
 
 constexpr double most_noise_dof = 20000.0;
 
@@ -69,6 +81,14 @@ Covariance2 multiplied(const Covariance2& c, std::complex<double> q) noexcept {
           .im_im = i * i * c.re_re + 2.0 * r * i * c.re_im + r * r * c.im_im};
 }
 
+// The tone at another phase.
+Phasor shifted(Phasor tone, double angle_rad) noexcept {
+  if (angle_rad == 0.0) return tone;
+  const double c = std::cos(angle_rad);
+  const double s = std::sin(angle_rad);
+  return {.cosine = tone.cosine * c - tone.sine * s, .sine = tone.sine * c + tone.cosine * s};
+}
+
 std::complex<double> turn(double omega_rad_s, std::int64_t offset_ns) noexcept {
   return std::polar(1.0, -omega_rad_s * static_cast<double>(offset_ns) * 1e-9);
 }
@@ -89,7 +109,36 @@ void ModalSettling::know(const ModePrior& prior, std::span<const double> noise_v
                          double noise_dof) noexcept {
   prior_ = prior;
   known_ = true;
+  std::size_t index = 0;
+  for (const ModePole& pole : prior_.known()) {
+    const double size = std::abs(pole.sigma_rad_s);
+    most_variance_[index] =
+        std::pow((pole.real() ? least_known_real : least_known_decay) * size, 2);
+    if (!pole.real()) {
+      most_variance_[index + 1] = std::pow(least_known_turn * pole.omega_rad_s, 2);
+    }
+    index += pole.size();
+  }
+  limit_doubt();
+  for (std::size_t i = 0; i < prior_.parameters(); ++i) {
+    most_variance_[i] = prior_.covariance[triangle(i) + i];
+  }
   for (std::size_t i = 0; i < noise_.size(); ++i) noise_[i] = {noise_variance[i], noise_dof};
+}
+
+// Forgetting must not make a pole that dwells hardly see less known than it was at first: it would
+// wander off and become a trend.
+void ModalSettling::limit_doubt() noexcept {
+  const std::size_t parameters = prior_.parameters();
+  for (std::size_t i = 0; i < parameters; ++i) {
+    const double variance = prior_.covariance[triangle(i) + i];
+    if (!(variance > most_variance_[i])) continue;
+    const double scale = std::sqrt(most_variance_[i] / variance);
+    for (std::size_t j = 0; j < parameters; ++j) {
+      prior_.covariance[j <= i ? triangle(i) + j : triangle(j) + i] *=
+          j == i ? scale * scale : scale;
+    }
+  }
 }
 
 // The precision of the poles by inverting their covariance.
@@ -124,6 +173,7 @@ void ModalSettling::start(const ModalTask& task) noexcept {
   blocks_end_ = 0;
   blocks_.edge[0] = 0;
   linearisations_ = 0;
+  doubted_poles_ = false;
   doubt_ = ModalDoubt::none;
   solution_ = {};
   for (ModalResult& result : results_) result = {};
@@ -245,33 +295,37 @@ double ModalSettling::noise_of_window(std::size_t output,
   return (dof * solution.residual_variance() + known * expected_noise(output)) / (dof + known);
 }
 
-// The applied tone over the window: it is a sine, without a transient.
+// The applied tone over the window, without a transient. What was applied a little late or early
+// turns the tone; that it is a sine is judged from tick to tick.
 bool ModalSettling::fit_input(const ModalStore& store) noexcept {
-  NormalSums& sums = input_sums_;
-  std::fill(sums.gram.begin(), sums.gram.end(), 0.0);
-  std::fill(sums.moments.begin(), sums.moments.end(), 0.0);
-  sums.square = 0.0;
-  sums.count = 0.0;
-  ModalSample sample;
-  for (std::uint64_t at = blocks_.edge[0]; at < blocks_.edge[block_count_]; ++at) {
-    if (!store.sample(0, at, sample)) continue;
-    const double c = std::cos(task_.omega_rad_s * sample.off_grid_s);
-    const double s = std::sin(task_.omega_rad_s * sample.off_grid_s);
-    const double x[3] = {sample.tone.cosine * c - sample.tone.sine * s,
-                         sample.tone.sine * c + sample.tone.cosine * s, 1.0};
-    for (std::size_t i = 0; i < 3; ++i) {
-      for (std::size_t j = 0; j <= i; ++j) sums.gram[triangle(i) + j] += x[i] * x[j];
-      sums.moments[i] += x[i] * sample.value;
+  std::array<double, tone_columns> beta{};
+  const auto fit = [&](bool at_true_times) {
+    NormalSums& sums = input_sums_;
+    std::fill(sums.gram.begin(), sums.gram.end(), 0.0);
+    std::fill(sums.moments.begin(), sums.moments.end(), 0.0);
+    sums.square = 0.0;
+    ModalSample sample;
+    for (std::uint64_t at = blocks_.edge[0]; at < blocks_.edge[block_count_]; ++at) {
+      if (!store.sample(0, at, sample)) continue;
+      const Phasor tone =
+          at_true_times ? shifted(sample.tone, task_.omega_rad_s * sample.off_grid_s) : sample.tone;
+      const double x[tone_columns] = {tone.cosine, tone.sine, 1.0};
+      for (std::size_t i = 0; i < tone_columns; ++i) {
+        for (std::size_t j = 0; j <= i; ++j) sums.gram[triangle(i) + j] += x[i] * x[j];
+        sums.moments[i] += x[i] * sample.value;
+      }
+      sums.square += sample.value * sample.value;
     }
-    sums.square += sample.value * sample.value;
-    sums.count += 1.0;
-  }
-  if (!inverse_.factor(sums.gram, 3)) return false;
-  std::array<double, 3> beta{sums.moments[0], sums.moments[1], sums.moments[2]};
-  inverse_.solve(beta);
-  double left = sums.square;
-  for (std::size_t i = 0; i < 3; ++i) left -= beta[i] * sums.moments[i];
-  input_residual_ = left / std::max(sums.square, 1e-300);
+    if (!inverse_.factor(sums.gram, tone_columns)) return false;
+    std::copy_n(sums.moments.begin(), tone_columns, beta.begin());
+    inverse_.solve(beta);
+    return true;
+  };
+  if (!fit(false)) return false;
+  double left = input_sums_.square;
+  for (std::size_t i = 0; i < tone_columns; ++i) left -= beta[i] * input_sums_.moments[i];
+  input_residual_ = left / std::max(input_sums_.square, 1e-300);
+  if (!fit(true)) return false;
   input_ =
       std::complex<double>{beta[1], beta[0]} * turn(task_.omega_rad_s, store.common_offset_ns(0));
   return std::abs(input_) > 0.0;
@@ -379,14 +433,37 @@ bool ModalSettling::late_half_agrees() noexcept {
                            late_sigmas * std::sqrt(std::max(0.0, gained)));
 }
 
-ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
-  if (!solve_window()) return not_determined();
+// Solved, linear where the poles stand. False where the window does not determine the tone.
+bool ModalSettling::settle_poles(const ModalStore& store) noexcept {
+  if (!solve_window()) return false;
   for (int again = 0;
        again < most_at_once && needs_other_poles() && linearisations_ < most_linearisations;
        ++again) {
     ++linearisations_;
     linearise_again(store, outputs_[0]);
-    if (!solve_window()) return not_determined();
+    if (!solve_window()) return false;
+  }
+  return true;
+}
+
+// The modes may be right and their poles have moved further than was believed: once a dwell they
+// are looked for from the beginning, with less belief in what was known of them.
+void ModalSettling::doubt_poles(const ModalStore& store) noexcept {
+  doubted_poles_ = true;
+  for (double& each : belief_.precision) each /= doubted_variance;
+  linearisations_ = 0;
+  std::copy(prior_.poles.begin(), prior_.poles.end(), poles_.begin());
+  relinearise_regression();
+  for (std::size_t i = 0; i < block_count_; ++i) {
+    accumulate(store, outputs_[0], blocks_.edge[i], blocks_.edge[i + 1], blocks_.sums[i]);
+  }
+}
+
+ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
+  if (!settle_poles(store)) return not_determined();
+  if (!residual_explained(0) && !doubted_poles_) {
+    doubt_poles(store);
+    if (!settle_poles(store)) return not_determined();
   }
   if (!residual_explained(0)) {
     doubt_ = ModalDoubt::residual;
@@ -401,7 +478,7 @@ ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
                task_.target_deg > 0.0 ? task_.target_deg / degrees_per_radian : 1.0);
   if (4.0 * white > 2.0 * wanted * wanted) return ModalVerdict::going_on;
   if (!fit_input(store)) return ModalVerdict::going_on;
-  if (input_residual_ > 1e-12) {
+  if (input_residual_ > std::pow(harmonics_part_of_target * wanted, 2)) {
     doubt_ = ModalDoubt::not_a_sine;
     return ModalVerdict::abandoned;
   }
@@ -506,6 +583,7 @@ void ModalSettling::move_prior() noexcept {
   for (std::size_t i = 0; i < triangle(prior_.parameters()); ++i) {
     prior_.covariance[i] = forgetting * posterior_[i];
   }
+  limit_doubt();
 }
 
 void ModalSettling::learn_noise(std::size_t output) noexcept {

@@ -95,6 +95,7 @@ class ModalSettling {
   void linearise_again(const ModalStore& store, std::size_t channel) noexcept;
   void relinearise_regression() noexcept;
   void believe() noexcept;
+  void limit_doubt() noexcept;
   void learn_noise(std::size_t output) noexcept;
   double expected_noise(std::size_t output) const noexcept;
   double noise_of_window(std::size_t output, const ModalSolution& solution) const noexcept;
@@ -106,12 +107,15 @@ class ModalSettling {
   bool residual_explained(std::size_t output) const noexcept;
   bool take_other_outputs(const ModalStore& store) noexcept;
   void move_prior() noexcept;
+  bool settle_poles(const ModalStore& store) noexcept;
+  void doubt_poles(const ModalStore& store) noexcept;
   ModalVerdict decide(const ModalStore& store) noexcept;
 
   std::vector<std::size_t> outputs_;
   double rate_hz_;
   ModePrior prior_;
   bool known_ = false;
+  std::array<double, ModePrior::max_parameters> most_variance_{};  // of the prior's parameters
   PoleBelief belief_;
   std::vector<OutputNoise> noise_;
   std::vector<NoiseMemory> memories_;
@@ -136,6 +140,7 @@ class ModalSettling {
   std::uint64_t block_length_ = 16;
   std::uint64_t blocks_end_ = 0;  // samples that are in blocks
   int linearisations_ = 0;
+  bool doubted_poles_ = false;
   std::complex<double> input_;
   double input_residual_ = 0.0;
   ModalDoubt doubt_ = ModalDoubt::none;

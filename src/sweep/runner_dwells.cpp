@@ -161,7 +161,8 @@ void SweepRunner::judge_model() noexcept {
               .tick = last_tick_,
               .value = static_cast<double>(judgement)});
     if (judgement == ModelTrust::Judgement::given_up) measurement.stop_modelling();
-    use = judgement == ModelTrust::Judgement::replaced;
+    // Confirmed modes, too: what dwells have made of them was doubted.
+    use = found != nullptr && judgement != ModelTrust::Judgement::given_up;
   }
   if (use) measurement.know(found->prior, found->noise_variance, found->noise_dof);
   announce({.kind = EventKind::probed,

@@ -16,6 +16,7 @@ struct Options {
   std::uint32_t seeds = 20;
   std::uint64_t first_seed = 1001;
   std::string rigs;
+  bool each = false;               // tells of every sweep
   std::vector<std::string> cases;  // "g1_80"; empty: all
 
   bool wants(const std::string& name) const;

@@ -174,8 +174,10 @@ constexpr Part parts[] = {
 int usage() {
   std::fprintf(
       stderr,
-      "transient [time|coverage|order|tick] [--seeds N] [--first-seed S] [--case g1_80 …]\n"
-      "Without a part: all of them. Cases: g1 to g4, _80, _60 and _20 dB.\n");
+      "transient [time|coverage|order|tick] [--seeds N] [--first-seed S] [--case g1_80 …] "
+      "[--each]\n"
+      "Without a part: all of them. Cases: g1 to g4, _80, _60 and _20 dB. --each tells of every "
+      "sweep.\n");
   return 2;
 }
 
@@ -194,6 +196,8 @@ int run(int argc, char** argv) {
       options.seeds = static_cast<std::uint32_t>(std::stoul(argv[++i]));
     } else if (word == "--first-seed" && !last) {
       options.first_seed = std::stoull(argv[++i]);
+    } else if (word == "--each") {
+      options.each = true;
     } else if (word == "--case" && !last) {
       while (i + 1 < argc && argv[i + 1][0] == 'g') options.cases.emplace_back(argv[++i]);
     } else {

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <map>
 #include <numbers>
 #include <random>
@@ -56,6 +57,26 @@ KnownModes told(const QualityCase& of, const Trouble& trouble, std::uint64_t see
     tell(known.prior, {.sigma_rad_s = -0.01 * omega, .omega_rad_s = omega}, 0.01, 0.2);
   }
   return known;
+}
+
+// A line per sweep: where its time went, and what it doubted.
+void print_sweep(std::uint64_t seed, const QualityCase& cell, const test::VirtualRun& run,
+                 const std::map<std::uint32_t, Point>& last) {
+  std::printf("  seed %llu: %.1f s;", static_cast<unsigned long long>(seed),
+              static_cast<double>(run.outcome.ticks) / cell.plan.rate_hz);
+  for (const auto& [dwell, point] : last) {
+    const bool modelled = point.settled_by == SettledBy::model;
+    if (modelled && point.status == PointStatus::good && point.seconds < 4.0) continue;
+    const auto error = quality::error_of(point.response, cell.plant.response(point.frequency_hz));
+    std::printf(" %.3g Hz %s %.1f s %s %.3f dB;", point.frequency_hz, to_string(point.settled_by),
+                point.seconds, to_string(point.status), error.gain_db);
+  }
+  for (const Event& event : run.sink.events) {
+    const bool telling = event.kind == EventKind::model_doubted ||
+                         event.kind == EventKind::probed || event.kind == EventKind::remeasured;
+    if (telling) std::printf(" %s(%u) %g;", to_string(event.kind), event.dwell, event.value);
+  }
+  std::printf("\n");
 }
 
 }  // namespace
@@ -116,6 +137,7 @@ Tally measure(const Case& of, const Options& options, double cycles, const Troub
           static_cast<double>(cell.plan.dwells[dwell].max_samples + 1) / cell.plan.rate_hz;
       tally.beyond_cap += point.seconds > cap ? 1 : 0;
     }
+    if (options.each) print_sweep(seed, cell, run, last);
     tally.within += within ? 1.0 : 0.0;
     tally.within_or_flagged += honest ? 1.0 : 0.0;
     tally.seconds += static_cast<double>(run.outcome.ticks) / cell.plan.rate_hz;
