@@ -41,6 +41,21 @@ TEST_F(ReportCommand, RunLeavesAReportAndSaysWhere) {
   EXPECT_THAT(workshop_.read("axis.html"), HasSubstr("<title>axis – sinerig</title>"));
 }
 
+// White noise of 1e-3 on a sine of 0.1 behind a gain near 1: SNR 37 dB per sample, and over one
+// cycle of some 250 samples a coherence that lacks 1e-6 or so.
+TEST_F(ReportCommand, ShowReportAndExportsGiveTheCoherence) {
+  workshop_.sinerig("run axis.toml");
+  const auto show = workshop_.sinerig("show axis.sweep");
+  EXPECT_THAT(show.output, HasSubstr("SNR dB coherence"));
+  EXPECT_THAT(show.output, HasSubstr(" 0.9999"));
+  EXPECT_THAT(workshop_.read("axis.html"), HasSubstr("\"coherence\":[0.9999"));
+  EXPECT_THAT(workshop_.sinerig("export axis.sweep --format json").output,
+              HasSubstr("\"coherence\": 0.9999"));
+  EXPECT_THAT(workshop_.sinerig("export axis.sweep").output, HasSubstr(",snr_db,coherence,"));
+  EXPECT_THAT(workshop_.sinerig("run axis.toml --json -o again.sweep").output,
+              HasSubstr("\"coherence\":0.9999"));
+}
+
 TEST_F(ReportCommand, RunWritesNoneWhenToldSo) {
   EXPECT_EQ(workshop_.sinerig("run axis.toml --no-report").exit_code, 0);
   EXPECT_TRUE(workshop_.has("axis.sweep"));
