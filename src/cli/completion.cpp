@@ -116,6 +116,7 @@ std::string quoted(const std::string& text, bool zsh = false) {
 
 void write_bash(std::ostream& stream, const std::vector<CompletedCommand>& commands) {
   std::vector<std::string> names;
+  names.reserve(commands.size());
   for (const CompletedCommand& command : commands) names.push_back(command.name);
   stream << "# bash completion for sinerig: sinerig completion bash\n"
             "_sinerig() {\n"

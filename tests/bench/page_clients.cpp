@@ -43,6 +43,7 @@ void send_text(int socket, const std::string& text) {
 
 [[noreturn]] void watch(const std::vector<int>& sockets) {
   std::vector<pollfd> readable;
+  readable.reserve(sockets.size());
   for (const int socket : sockets)
     readable.push_back({.fd = socket, .events = POLLIN, .revents = 0});
   std::vector<char> bytes(1U << 16U);

@@ -197,8 +197,9 @@ TEST_F(Page, ShowsAModelWithItsResidual) {
       "");
   EXPECT_TRUE(browser_->evaluate("!!document.querySelector('#poles-0 svg')").get<bool>());
   // A scale needs two labels at least.
-  EXPECT_GE(browser_->evaluate("document.querySelectorAll('#residual-gain text[text-anchor=end]')"
-                               ".length - 1")
+  EXPECT_GE(browser_
+                ->evaluate("document.querySelectorAll('#residual-gain text[text-anchor=end]')"
+                           ".length - 1")
                 .get<int>(),
             2);
   keep_picture("model");

@@ -25,6 +25,7 @@ constexpr const char* answer_ends = "\002";
 
 TypedShell::TypedShell(std::vector<std::string> command, const std::filesystem::path& folder) {
   std::vector<char*> arguments;
+  arguments.reserve(command.size() + 1);
   for (std::string& each : command) arguments.push_back(each.data());
   arguments.push_back(nullptr);
   winsize size{.ws_row = 50, .ws_col = 1000, .ws_xpixel = 0, .ws_ypixel = 0};
