@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
-#include <stdexcept>
 #include <utility>
 
 namespace sinerig::can {
@@ -14,31 +13,7 @@ using config::Range;
 using config::zero_or_more;
 
 constexpr Range a_byte{.min = 0.0, .max = 255.0};
-constexpr Range an_id{.min = 0.0, .max = max_extended_id};
 constexpr Range a_payload_position{.min = 0.0, .max = max_fd_bytes - 1};
-
-std::int64_t nanoseconds(double seconds) {
-  return std::llround(seconds * 1e9);
-}
-
-// What the codec refuses, at the key it is about.
-template <class Action>
-decltype(auto) at_key(const Keys& keys, std::string_view key, Action action) {
-  try {
-    return action();
-  } catch (const config::ConfigError&) {
-    throw;
-  } catch (const std::exception& refused) {
-    keys.refuse(key, refused.what());
-  }
-}
-
-std::uint64_t raw_of(const Signal& signal, double value) {
-  Frame scratch;
-  scratch.length = max_fd_bytes;
-  encode(scratch.payload(), signal, value);
-  return extract_raw(scratch.payload(), signal);
-}
 
 }  // namespace
 
@@ -221,150 +196,6 @@ void ConfigReader::require_bytes(const Keys& keys, std::string_view key, Pattern
     pattern.require_byte(static_cast<std::size_t>(row[0]), static_cast<std::uint8_t>(row[1]),
                          static_cast<std::uint8_t>(mask));
   }
-}
-
-Pattern ConfigReader::expected(const Keys& keys) {
-  Pattern pattern;
-  if (keys.has("expect_id")) {
-    pattern.extended = keys.at("expect_extended").flag("expect_extended", false);
-    const auto id = static_cast<std::uint32_t>(keys.integer("expect_id", an_id));
-    pattern.id = shifted(keys, "expect_id", id, pattern.extended, "expect_node_step");
-    require_bytes(keys, "expect_bytes", pattern);
-    return pattern;
-  }
-  for (const Keys& entry : keys.tables("expect")) {
-    const Place found = place_by_name(entry);
-    pattern.id = found.frame.id;
-    pattern.extended = found.frame.extended;
-    pattern.require(found.signal,
-                    raw_of(found.signal, entry.at("value").number("value", any_number)));
-  }
-  return pattern;
-}
-
-Step ConfigReader::step(const Keys& keys) {
-  Step step;
-  step.name = keys.at("name").text("name");
-  if (keys.has("id")) {
-    step.frame = frame(keys);
-    fill(keys, *step.frame, false);
-  } else if (keys.has("message")) {
-    const std::string name = keys.at("message").text("message");
-    step.frame = at_key(keys, "message",
-                        [&] { return frame_of_message(keys, dbc(keys).find_message(name)); });
-  } else if (const std::vector<Keys> entries = keys.tables("set"); !entries.empty()) {
-    step.frame = place_by_name(entries.front()).frame;
-    fill(keys, *step.frame, true);
-  }
-  if (step.frame) {
-    const Checksum seal_rule = checksum(keys, step.frame->length);
-    seal(*step.frame, seal_rule);
-    at_key(keys, "name", [&] { check(*step.frame); });
-  }
-  step.delay_ns = nanoseconds(keys.number("delay_s", {.min = 0.0, .max = 60.0}, 0.0));
-  step.repeats =
-      static_cast<std::uint32_t>(keys.integer("repeats", {.min = 1.0, .max = 1000.0}, 1));
-  if (keys.has("expect_id") || keys.has("expect")) {
-    Expectation expectation;
-    expectation.pattern = expected(keys);
-    if (keys.has("refuse_bytes")) {
-      expectation.refusal = Pattern{};
-      expectation.refusal->id = expectation.pattern.id;
-      expectation.refusal->extended = expectation.pattern.extended;
-      require_bytes(keys, "refuse_bytes", *expectation.refusal);
-    }
-    expectation.timeout_ns =
-        nanoseconds(keys.number("timeout_s", {.min = 0.0, .max = 60.0, .open_min = true}, 0.5));
-    step.expect = expectation;
-  }
-  return step;
-}
-
-// The device's part of a list comes first, the channel's after it.
-Sequence ConfigReader::sequence(const Keys& keys, std::string_view list) {
-  Sequence sequence;
-  if (device_)
-    for (const Keys& entry : device_->tables(list)) sequence.push_back(step(entry));
-  for (const Keys& entry : keys.tables(list)) sequence.push_back(step(entry));
-  return sequence;
-}
-
-HealthRule ConfigReader::health(const Keys& keys) {
-  HealthRule rule;
-  rule.name = keys.at("name").text("name");
-  const Place found = place(keys);
-  rule.pattern = found.pattern;
-  require_bytes(keys, "match_bytes", rule.pattern);
-  rule.signal = found.signal;
-  using Operator = HealthRule::Operator;
-  const std::pair<const char*, Operator> operators[] = {{"equals", Operator::equal},
-                                                        {"not", Operator::not_equal},
-                                                        {"at_most", Operator::at_most},
-                                                        {"at_least", Operator::at_least}};
-  int given = 0;
-  for (const auto& [key, comparison] : operators) {
-    if (!keys.has(key)) continue;
-    ++given;
-    rule.comparison = comparison;
-    rule.value = keys.at(key).number(key, any_number);
-  }
-  if (given != 1) keys.refuse("name", "needs exactly one of equals, not, at_most, at_least");
-  rule.max_age_ns = nanoseconds(keys.number("max_age_s", zero_or_more, 0.0));
-  return rule;
-}
-
-void ConfigReader::watch(const Keys& keys, CommandSettings& settings) {
-  for (const Keys& entry : keys.tables("keep_alive")) {
-    const Step sent = step(entry);
-    if (!sent.frame) entry.refuse("name", "needs a frame: id, message or set");
-    const double period_s = entry.at("period_s").number("period_s", zero_or_more);
-    settings.keep_alive.push_back({*sent.frame, nanoseconds(period_s)});
-  }
-  for (const Keys& entry : keys.tables("health")) settings.health.push_back(health(entry));
-}
-
-CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
-  const bool by_name = keys.has("signal");
-  const std::string_view where = by_name ? "signal" : "start_bit";
-  Place found = place(keys);
-  CommandSettings settings;
-  settings.frame = found.frame;
-  fill(keys, settings.frame, by_name);
-  settings.signal = found.signal;
-  at_key(keys, where, [&] {
-    check(settings.frame);
-    check(settings.signal, settings.frame.length);
-  });
-  settings.checksum = checksum(keys, settings.frame.length);
-  settings.neutral = neutral;
-  settings.startup = sequence(keys, "startup");
-  settings.arm = sequence(keys, "arm");
-  settings.disarm = sequence(keys, "disarm");
-  settings.shutdown = sequence(keys, "shutdown");
-  if (device_) watch(*device_, settings);
-  watch(keys, settings);
-  return settings;
-}
-
-FeedbackSettings ConfigReader::feedback(const Keys& keys) {
-  const Place found = place(keys);
-  FeedbackSettings settings;
-  settings.signal = found.signal;
-  settings.pattern = found.pattern;
-  settings.pattern.id_mask =
-      static_cast<std::uint32_t>(keys.integer("id_mask", an_id, max_extended_id));
-  require_bytes(keys, "match_bytes", settings.pattern);
-  settings.pattern.cover(settings.signal);
-  at_key(keys, keys.has("signal") ? "signal" : "start_bit",
-         [&] { check(settings.signal, settings.pattern.minimum_length); });
-  settings.checksum = checksum(keys, std::max(found.frame.length, settings.pattern.minimum_length));
-  settings.fd = found.frame.fd;
-  if (keys.has("invalid"))
-    settings.invalid_raw = static_cast<std::uint64_t>(
-        keys.integer("invalid", {.min = 0.0, .max = 9007199254740992.0}));
-  settings.timeout_ns = nanoseconds(keys.number("timeout_s", zero_or_more, 0.0));
-  for (const Keys& entry : keys.tables("poll")) settings.poll = step(entry).frame;
-  return settings;
 }
 
 }  // namespace sinerig::can

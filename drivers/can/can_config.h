@@ -14,6 +14,9 @@
 
 namespace sinerig::can {
 
+// What an identifier can be.
+inline constexpr config::Range an_id{.min = 0.0, .max = max_extended_id};
+
 class ConfigReader {
  public:
   // `device` has what all channels of a profile share: dbc, node_step, lists; none without a

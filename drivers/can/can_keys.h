@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <exception>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -57,5 +58,17 @@ class Keys {
   config::Section base_;
   std::string base_folder_;
 };
+
+// Calls `action`, and tells what it refuses at the key that it is about: config::ConfigError.
+template <class Action>
+decltype(auto) at_key(const Keys& keys, std::string_view key, Action action) {
+  try {
+    return action();
+  } catch (const config::ConfigError&) {
+    throw;
+  } catch (const std::exception& refused) {
+    keys.refuse(key, refused.what());
+  }
+}
 
 }  // namespace sinerig::can

@@ -1,5 +1,6 @@
 #include "drivers/modbus/link.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <unistd.h>
 #include <utility>
@@ -64,8 +65,9 @@ void Link::serve_one() noexcept {
 void Link::reconnect_now_and_then() noexcept {
   const std::int64_t now_ns = monotonic_now_ns();
   if (now_ns < next_reconnect_ns_) return;
-  transport_.try_connect();
-  next_reconnect_ns_ = monotonic_now_ns() + reconnect_period_ns;
+  if (transport_.try_connect()) pause_ns_ = first_pause_ns;
+  next_reconnect_ns_ = monotonic_now_ns() + pause_ns_;
+  if (!transport_.connected()) pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
 }
 
 void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept {

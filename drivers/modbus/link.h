@@ -100,7 +100,9 @@ class Link {
   void find_spare_registers();
   void reconnect_now_and_then() noexcept;
 
-  static constexpr std::int64_t reconnect_period_ns = 100'000'000;
+  // Between two attempts: a device that restarts is often back after a few ticks.
+  static constexpr std::int64_t first_pause_ns = 10'000'000;
+  static constexpr std::int64_t longest_pause_ns = 100'000'000;
 
   LinkSettings settings_;
   std::vector<Place> places_;
@@ -129,6 +131,7 @@ class Link {
   Answer failure_;
   bool has_failed_ = false;
   std::int64_t next_reconnect_ns_ = 0;
+  std::int64_t pause_ns_ = first_pause_ns;
 
   int wake_ = -1;
   std::optional<realtime::Grant> scheduling_;

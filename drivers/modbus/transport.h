@@ -16,7 +16,7 @@
 #include "drivers/modbus/late_answers.h"
 #include "drivers/modbus/request.h"
 
-struct _modbus;
+struct _modbus;  // NOLINT(bugprone-reserved-identifier): the name that libmodbus gives it
 
 namespace sinerig::modbus {
 

@@ -58,7 +58,7 @@ class Wire {
 
  private:
   struct Late {
-    std::int64_t due_ns;
+    std::int64_t due_ns = 0;
     can::Frame frame;
   };
 
