@@ -3,6 +3,7 @@
 // what earlier dwells have taught.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <complex>
 #include <cstdint>
@@ -70,7 +71,8 @@ class ModalSettling {
   ModalDoubt doubt() const noexcept { return doubt_; }
   // Samples at which another look is worth the while.
   std::uint64_t next_look() const noexcept {
-    const std::uint64_t next = blocks_end_ + block_length_;
+    const std::uint64_t block = blocks_end_ + block_length_;
+    const std::uint64_t next = sooner_ > blocks_end_ ? std::min(sooner_, block) : block;
     return blocks_end_ < task_.least_samples && next > task_.least_samples ? task_.least_samples
                                                                            : next;
   }
@@ -101,7 +103,7 @@ class ModalSettling {
   double noise_of_window(std::size_t output, const ModalSolution& solution) const noexcept;
   bool fill_result(const ModalStore& store, std::size_t output) noexcept;
   bool fit_input(const ModalStore& store) noexcept;
-  bool target_met(double slack) const noexcept;
+  double target_excess() const noexcept;
   ModalVerdict not_determined() noexcept;
   bool late_half_agrees() noexcept;
   bool residual_explained(std::size_t output) const noexcept;
@@ -138,6 +140,7 @@ class ModalSettling {
   ModalSums window_;
   std::size_t block_count_ = 0;
   std::uint64_t block_length_ = 16;
+  std::uint64_t sooner_ = 0;      // a look before the end of the next block; 0: none
   std::uint64_t blocks_end_ = 0;  // samples that are in blocks
   int linearisations_ = 0;
   bool doubted_poles_ = false;
