@@ -79,8 +79,8 @@ struct SweepSettings {
   double ramp_s = 0.0;
 
   Settling settling = Settling::detect;
-  double check_fraction = 0.02;  // model: this part of the modelled dwells is measured both ways
-  double probe_s = -1.0;         // model: length of the first pass; negative: of its own, 0: none
+  double check_fraction = 0.002;  // model: this part of the modelled dwells is measured both ways
+  double probe_s = -1.0;          // model: length of the first pass; negative: of its own, 0: none
   Span settle{.cycles = 0.0, .seconds = 0.0};           // waited for before anything is measured
   Span settle_max{.cycles = 20.0, .seconds = 20.0};     // detect: how long settling may take
   Span integrate{.cycles = 1.0, .seconds = 0.1};        // at least

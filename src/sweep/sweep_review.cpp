@@ -23,6 +23,10 @@ constexpr double doubt = 9.0;
 // it.
 constexpr double least_left = 0.1;
 
+// Lags that a probe does not always tell from dead time, without which 12 points of g1 strayed at
+// 60 dB: e^{sT} of 0.6 to 4.5 ticks.
+constexpr double fast[] = {0.2, 0.4, 0.6, 0.8};
+
 constexpr double least_dof = 10.0;
 constexpr int steps = 3;
 constexpr double ridge = 1e-10;
@@ -62,7 +66,7 @@ void SweepReview::review() noexcept {
   if (dwells_ == 0) return;
   parameters_ = modes_.parameters();
   const std::size_t taps = std::min<std::size_t>(most_taps, modes_.blind_ticks);
-  linear_ = parameters_ + integrators + taps;
+  linear_ = parameters_ + integrators + fast_lags + taps;
   columns_ = linear_ + parameters_;
   for (std::size_t response = 0; response < seen_.size() / dwells_; ++response) review(response);
 }
@@ -101,6 +105,7 @@ void SweepReview::regressors(double omega_rad_s) noexcept {
   const std::complex<double> integrator = period_s_ / (ahead - 1.0);
   row_[at++] = integrator;
   row_[at++] = integrator * integrator;
+  for (const double z : fast) row_[at++] = (1.0 - z) / (ahead - z);
   std::complex<double> tap = 1.0;
   for (; at < linear_; ++at, tap /= ahead) row_[at] = tap;
 }

@@ -1,12 +1,14 @@
 // One model of the whole sweep against every point of it: what a dwell cannot know of itself, its
 // neighbours tell.
 //
-//   H(ζ) = Σ c_i (1 − z_i) / (ζ − z_i) + Σ w_d ζ^−d + integrators,   ζ = e^{jωT}, z_i = e^{s_i T}
+//   H(ζ) = Σ c_i (1 − z_i) / (ζ − z_i) + Σ w_d ζ^−d + integrators + lags,
+//   ζ = e^{jωT}, z_i = e^{s_i T}
 //
 // is exact for modes behind a hold and a dead time of any part of a tick; c and w are linear, the
-// poles s are those that the dwells have found, and move as far as they are doubted. Each point is
-// held against the model of all the others (the deleted residual of a regression; Cook and
-// Weisberg, Residuals and Influence in Regression, 1982, section 2.2).
+// poles s are those that the dwells have found, and move as far as they are doubted; lags of a few
+// ticks stand for what is too fast for a dwell. Each point is held against the model of all the
+// others (the deleted residual of a regression; Cook and Weisberg, Residuals and Influence in
+// Regression, 1982, section 2.2).
 #pragma once
 
 #include <array>
@@ -47,8 +49,9 @@ class SweepReview {
  private:
   static constexpr std::size_t most_taps = 5;
   static constexpr std::size_t integrators = 2;
+  static constexpr std::size_t fast_lags = 4;
   static constexpr std::size_t most_columns =
-      2 * ModePrior::max_parameters + most_taps + integrators;
+      2 * ModePrior::max_parameters + most_taps + integrators + fast_lags;
 
   struct Seen {
     std::complex<double> response;
