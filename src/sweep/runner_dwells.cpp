@@ -17,6 +17,12 @@ constexpr double relative_to_db = 20.0 / std::numbers::ln10;
 // Once what disagrees has been measured again, others may stand out.
 constexpr int most_reviews = 3;
 
+// One of so many modelled points may stray and be measured again.
+constexpr std::uint32_t most_strays = 8;
+
+// Beside what ModelTrust::Judgement says.
+constexpr double review_inconclusive = 3.0;
+
 }  // namespace
 
 // After the actuator has been released: true when everything is armed again and the dwell begins
@@ -262,18 +268,34 @@ void SweepRunner::review() noexcept {
 
 void SweepRunner::hear_review() noexcept {
   review_.close();
-  bool any = false;
+  const auto strays = [&](std::uint32_t dwell) {
+    return trust_.modelled(dwell) && review_.disagreement(dwell) > 0.0;
+  };
+  std::uint32_t modelled = 0;
+  std::uint32_t stray = 0;
   for (std::uint32_t dwell = 0; dwell < dwells_.size(); ++dwell) {
+    modelled += trust_.modelled(dwell) ? 1U : 0U;
+    stray += strays(dwell) ? 1U : 0U;
+  }
+  if (stray == 0) return;
+  // Where many stray, it is the model of the sweep that is too small: said, not acted upon.
+  if (stray > std::max(1U, modelled / most_strays)) {
+    announce({.kind = EventKind::model_doubted,
+              .dwell = dwell_,
+              .tick = last_tick_,
+              .value = review_inconclusive});
+    return;
+  }
+  for (std::uint32_t dwell = 0; dwell < dwells_.size(); ++dwell) {
+    if (!strays(dwell)) continue;
     const double disagreement = review_.disagreement(dwell);
-    if (!trust_.modelled(dwell) || disagreement == 0.0) continue;
-    any = true;
     trust_.condemn(dwell);
     announce({.kind = EventKind::condemned,
               .dwell = dwell,
               .tick = last_tick_,
               .value = relative_to_db * disagreement});
   }
-  if (any) next_condemned();
+  next_condemned();
 }
 
 // One more dwell where the response between two points is not known.
