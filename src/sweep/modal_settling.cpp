@@ -43,7 +43,7 @@ constexpr double least_dof = 8.0;
 
 // The late half strays from the whole: allowed in sigma of what the noise makes of that, and as a
 // part of the target.
-constexpr double late_sigmas = 3.0;
+constexpr double late_sigmas = 2.5;
 constexpr double late_part_of_target = 0.25;
 
 // … where the residual says that they are others: multiplies their variance.
@@ -172,7 +172,6 @@ void ModalSettling::start(const ModalTask& task) noexcept {
   block_count_ = 0;
   block_length_ = std::max(shortest_block, task.least_samples / blocks_per_window);
   blocks_end_ = 0;
-  sooner_ = 0;
   blocks_.edge[0] = 0;
   linearisations_ = 0;
   doubted_poles_ = false;
@@ -399,8 +398,7 @@ bool ModalSettling::fill_result(const ModalStore& store, std::size_t output) noe
   if (colour < 1.0 + coloured_sigmas * std::sqrt(2.0 / result.variance.dof)) {
     result.variance.covariance = estimate.white;
     result.variance.dof =
-        std::max(result.variance.dof, std::max(1.0, solution_.samples - solution_.unknowns) +
-                                          std::min(noise_[output].dof, most_pooled_dof));
+        std::max(result.variance.dof, std::min(noise_[output].dof, most_pooled_dof));
     result.variance.expected = 1.0;
   }
   result.known = true;
@@ -488,14 +486,7 @@ ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
     return ModalVerdict::abandoned;
   }
   if (!fill_result(store, 0)) return ModalVerdict::going_on;
-  if (const double excess = target_excess(); !(excess <= 1.0)) {
-    // Noise falls with the root of time: the next look need not wait for a whole block.
-    const double more = static_cast<double>(length) * (excess * excess - 1.0);
-    if (more < static_cast<double>(block_length_)) {
-      sooner_ = blocks_end_ + std::max(shortest_block, static_cast<std::uint64_t>(more));
-    }
-    return ModalVerdict::going_on;
-  }
+  if (!(target_excess() <= 1.0)) return ModalVerdict::going_on;
   solver_.pole_covariance({posterior_.data(), triangle(prior_.parameters())});
   if (!late_half_agrees()) {
     // The oldest quarter goes.
@@ -564,7 +555,6 @@ ModalVerdict ModalSettling::look(const ModalStore& store, std::uint64_t count) n
     const std::uint64_t end = next_look();
     accumulate(store, outputs_[0], blocks_end_, end, blocks_.sums[block_count_]);
     blocks_end_ = end;
-    sooner_ = 0;
     blocks_.edge[++block_count_] = blocks_end_;
     if (end - blocks_.edge[0] < task_.least_samples) continue;
     const ModalVerdict verdict = decide(store);

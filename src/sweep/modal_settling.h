@@ -71,8 +71,7 @@ class ModalSettling {
   ModalDoubt doubt() const noexcept { return doubt_; }
   // Samples at which another look is worth the while.
   std::uint64_t next_look() const noexcept {
-    const std::uint64_t block = blocks_end_ + block_length_;
-    const std::uint64_t next = sooner_ > blocks_end_ ? std::min(sooner_, block) : block;
+    const std::uint64_t next = blocks_end_ + block_length_;
     return blocks_end_ < task_.least_samples && next > task_.least_samples ? task_.least_samples
                                                                            : next;
   }
@@ -140,7 +139,6 @@ class ModalSettling {
   ModalSums window_;
   std::size_t block_count_ = 0;
   std::uint64_t block_length_ = 16;
-  std::uint64_t sooner_ = 0;      // a look before the end of the next block; 0: none
   std::uint64_t blocks_end_ = 0;  // samples that are in blocks
   int linearisations_ = 0;
   bool doubted_poles_ = false;
