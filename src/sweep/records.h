@@ -138,7 +138,7 @@ enum class EventKind : std::uint8_t {
   started,
   probed,  // the first pass has ended; value: modes found
   dwell_began,
-  model_doubted,  // value: what came of it: 0 confirmed, 1 replaced, 2 given up
+  model_doubted,  // value: what came of it: 0 confirmed, 1 replaced, 2 given up, 3 see review()
   checked,        // a modelled dwell, by detection; value: disagreement, dB; see Check
   condemned,   // its points have to be measured again; value: disagreement, dB, with the model of
                // the sweep; 0: its modes turned out wrong
