@@ -182,6 +182,7 @@ SweepSettings read_sweep(const Section& section, double rate_hz) {
   sweep.ramp_s = section.number("ramp_s", {.min = 0.0, .max = 3600.0}, sweep.ramp_s);
   sweep.settling = read_settling(section, sweep);
   sweep.probe_s = section.number("probe_s", {.min = -1.0, .max = 3600.0}, sweep.probe_s);
+  sweep.check_fraction = section.number("check_fraction", fraction_of_one, sweep.check_fraction);
   if (sweep.settling == Settling::fixed) sweep.settle = default_fixed_wait;
   sweep.settle = read_span(section, "settle", sweep.settle, zero_or_more);
   sweep.settle_max = read_span(section, "settle_max", sweep.settle_max, zero_or_more);

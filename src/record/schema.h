@@ -68,7 +68,8 @@ CREATE TABLE point (            -- H = Y/U at one frequency, written when its dw
   reason           TEXT NOT NULL,
   reason_value     REAL,
   settled_by       TEXT NOT NULL DEFAULT 'detection', -- how its transient was dealt with: wait,
-                                -- detection, model
+                                -- detection, model, fallback (its model was abandoned), both (a
+                                -- modelled dwell that was checked by detection)
   PRIMARY KEY (dwell, tone, response)
 ) WITHOUT ROWID;
 

@@ -57,6 +57,7 @@ Point point_of(const StoredPoint& stored, std::size_t pair) {
           .output = static_cast<std::uint16_t>(stored.output),
           .status = named(stored.status, PointStatus::stopped),
           .reason = named(stored.reason, PointReason::guard_trip),
+          .settled_by = named(stored.settled_by, SettledBy::both),
           .reason_value = stored.reason_value,
           .frequency_hz = stored.frequency_hz,
           .response = stored.response,
@@ -74,12 +75,35 @@ Point point_of(const StoredPoint& stored, std::size_t pair) {
           .seconds = stored.seconds};
 }
 
-std::uint32_t finished_dwells(const StoredRun& run) {
+// Finished dwells that were to be measured again and have not been: their timing is older than the
+// sentence, or the new try was stopped.
+std::set<std::uint32_t> condemned_dwells(const StoredRun& run) {
+  std::map<std::uint32_t, std::uint64_t> sentenced;
+  for (const StoredEvent& event : run.events) {
+    if (event.kind == to_string(EventKind::condemned)) sentenced[event.dwell] = event.tick;
+  }
+  std::set<std::uint32_t> condemned;
+  for (const StoredTiming& timing : run.timings) {
+    const auto found = sentenced.find(timing.dwell);
+    if (found != sentenced.end() && timing.first_tick <= found->second)
+      condemned.insert(timing.dwell);
+  }
+  for (const StoredResponse& response : run.responses) {
+    for (const StoredPoint& point : response.points) {
+      if (point.status == to_string(PointStatus::stopped) && sentenced.contains(point.dwell))
+        condemned.insert(point.dwell);
+    }
+  }
+  return condemned;
+}
+
+std::uint32_t finished_dwells(const StoredRun& run, const std::set<std::uint32_t>& condemned) {
   std::set<std::uint32_t> ended;
   for (const StoredTiming& timing : run.timings) ended.insert(timing.dwell);
   for (const StoredResponse& response : run.responses) {
     for (const StoredPoint& point : response.points) {
-      if (point.status == to_string(PointStatus::stopped)) ended.erase(point.dwell);
+      const bool stopped = point.status == to_string(PointStatus::stopped);
+      if (stopped && !condemned.contains(point.dwell)) ended.erase(point.dwell);
     }
   }
   std::uint32_t finished = 0;
@@ -158,10 +182,12 @@ UnfinishedRun read_unfinished(const std::string& path) {
   UnfinishedRun run{.stored = read_sweep(path), .finished = {}, .start = {}};
   Database database{path, Database::Mode::read};
   refuse_other_layout(path, database);
-  const std::uint32_t dwells = finished_dwells(run.stored);
+  const std::set<std::uint32_t> condemned = condemned_dwells(run.stored);
+  const std::uint32_t dwells = finished_dwells(run.stored, condemned);
   run.finished = {.dwells = dwells,
                   .points = points_of(run.stored, dwells),
                   .lessons = lessons_of(database),
+                  .condemned = {condemned.begin(), condemned.lower_bound(dwells)},
                   .known_dwells = static_cast<std::uint32_t>(run.stored.plan.dwells.size())};
   run.start = next_start(database, dwells);
   return run;

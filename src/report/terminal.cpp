@@ -209,7 +209,9 @@ void print_head(std::ostream& stream, const record::StoredRun& run) {
 
 bool any_modelled(const record::StoredResponse& response) {
   return std::any_of(response.points.begin(), response.points.end(), [](const auto& point) {
-    return point.settled_by == to_string(SettledBy::model);
+    return point.settled_by == to_string(SettledBy::model) ||
+           point.settled_by == to_string(SettledBy::fallback) ||
+           point.settled_by == to_string(SettledBy::both);
   });
 }
 

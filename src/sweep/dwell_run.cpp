@@ -32,12 +32,12 @@ DwellRun::DwellRun(const SweepPlan& plan, const RunnerSettings& settings, std::s
       range_faults_(sensors) {}
 
 void DwellRun::begin(const Dwell& dwell, std::uint32_t index, std::uint32_t attempt, double scale,
-                     std::uint64_t tick) noexcept {
+                     std::uint64_t tick, bool by_detection) noexcept {
   dwell_ = &dwell;
   index_ = index;
   attempt_ = attempt;
   scale_ = scale;
-  measurement_.start(dwell);
+  measurement_.start(dwell, by_detection);
   settle_left_ = dwell.settle_samples;
   blocks_ = 0;
   given_up_ = false;

@@ -1,6 +1,7 @@
 #include "sweep/measurement.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -11,6 +12,11 @@ namespace {
 
 // Checkpoints of a dwell: enough to drop a quarter of a short window, few enough to keep.
 constexpr std::size_t max_checkpoints = 65;
+
+// A dwell measured both ways disagrees: in sigma of both, and as a part of the target. At 4 one
+// check of 3000 does by chance.
+constexpr double checked_sigmas = 4.0;
+constexpr double checked_part_of_target = 0.5;
 
 // rad/s; one formula, so that what is recalled is what was learnt to the last bit.
 double angular_frequency(const Dwell& dwell, const Tone& tone, double rate_hz) {
@@ -34,7 +40,8 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
       estimates_(max_tones),
       strays_(max_tones),
       transients_(pairs_.size()),
-      omega_(max_bins) {
+      omega_(max_bins),
+      modelled_(pairs_.size()) {
   if (judgement_.settling != Settling::model) return;
   std::vector<std::size_t> outputs;
   for (const Pair& pair : pairs_) outputs.push_back(pair.output);
@@ -50,8 +57,9 @@ void Measurement::know(const ModePrior& prior, std::span<const double> noise_var
   if (modal_) modal_->know(prior, noise_variance, noise_dof);
 }
 
-void Measurement::start(const Dwell& dwell) noexcept {
+void Measurement::start(const Dwell& dwell, bool by_detection) noexcept {
   dwell_ = &dwell;
+  by_detection_ = by_detection;
   std::size_t bin = 0;
   for (const Tone& tone : dwell.tones) omega_[bin++] = angular_frequency(dwell, tone, rate_hz_);
   for (std::uint32_t order = 2; order <= dwell.harmonics; ++order)
@@ -83,8 +91,11 @@ void Measurement::restart() noexcept {
 
 void Measurement::start_modal() noexcept {
   by_model_ = false;
+  at_limit_ = false;
+  checking_ = false;
+  check_.reset();
   if (!modal_) return;
-  if (!modal_->knows() || dwell_->tones.size() > 1 || dwell_->bias_hz > 0.0) {
+  if (by_detection_ || !modal_->knows() || dwell_->tones.size() > 1 || dwell_->bias_hz > 0.0) {
     modal_->leave();
     return;
   }
@@ -132,7 +143,51 @@ void Measurement::add(std::span<const Phasor> phasors,
   modal_->add(phasors[0], observations);
   if (!modal_->accepted()) return;
   take_modal();
-  done_ = true;
+  if (!drawn()) {
+    done_ = true;
+    return;
+  }
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) modelled_[pair] = result(pair, 0);
+  by_model_ = false;
+  checking_ = true;
+}
+
+// As good as random, yet a function of the samples: the lowest bits of what was measured.
+bool Measurement::drawn() const noexcept {
+  auto bits = std::bit_cast<std::uint64_t>(result(0, 0).estimate.response.real());
+  // SplitMix64 (Steele, Lea and Flood 2014).
+  bits += 0x9e3779b97f4a7c15U;
+  bits = (bits ^ (bits >> 30U)) * 0xbf58476d1ce4e5b9U;
+  bits = (bits ^ (bits >> 27U)) * 0x94d049bb133111ebU;
+  bits ^= bits >> 31U;
+  return std::ldexp(static_cast<double>(bits >> 11U), -53) < judgement_.check_fraction;
+}
+
+// What the model has said and what is seen now that the transient has gone. Where it has not, the
+// model's word stands.
+void Measurement::hold_against_model() noexcept {
+  bool gone = true;
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) gone = gone && result(pair, 0).still;
+  if (!gone) {
+    for (std::size_t pair = 0; pair < pairs_.size(); ++pair) result(pair, 0) = modelled_[pair];
+    by_model_ = true;
+    return;
+  }
+  check_ = Check{};
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    const Result& one = modelled_[pair];
+    const Result& other = result(pair, 0);
+    if (!one.known || !other.known) continue;
+    const double gain = std::abs(other.estimate.response);
+    const double apart = std::abs(one.estimate.response - other.estimate.response) / gain;
+    const double noise = std::sqrt(one.variance.covariance.mean_variance() +
+                                   other.variance.covariance.mean_variance()) /
+                         gain;
+    const bool agrees = apart <= std::max(checked_part_of_target * judgement_.relative_target(),
+                                          checked_sigmas * std::hypot(noise, other.left));
+    check_->agrees = check_->agrees && agrees;
+    check_->disagreement = std::max(check_->disagreement, apart);
+  }
 }
 
 void Measurement::end_part() noexcept {
@@ -149,6 +204,7 @@ void Measurement::end_part() noexcept {
   }
   if (kept) judge();
   if (samples_ + dwell_->settle_samples >= dwell_->max_samples && !done_) {
+    at_limit_ = true;
     conclude();
     done_ = true;
   }
@@ -161,7 +217,10 @@ void Measurement::conclude() noexcept {
     return;
   }
   const Window window = current_window();
-  if (window.last == window.first) return;
+  if (window.last == window.first) {
+    if (checking_) hold_against_model();
+    return;
+  }
   taught_ = true;
   for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
     if (!evaluate(pair, window)) continue;
@@ -174,6 +233,7 @@ void Measurement::conclude() noexcept {
       memories_[pair].learn(each.estimate, omega_[tone] / (2.0 * std::numbers::pi));
     }
   }
+  if (checking_) hold_against_model();
 }
 
 std::optional<Lesson> Measurement::lesson(std::size_t pair, std::size_t tone) const noexcept {

@@ -21,6 +21,12 @@
 
 namespace sinerig {
 
+// A modelled dwell that has been measured by detection as well.
+struct Check {
+  double disagreement = 0.0;  // of the responses that differ most, relative
+  bool agrees = true;         // within the noise of both, or half the target
+};
+
 // A pair of regression channels (0 is what was applied, 1… the sensors) whose ratio is a response.
 // A dwell goes on until all have settled and, unless the target is of the first only, meet it.
 using Pairs = std::vector<Pair>;
@@ -40,7 +46,8 @@ class Measurement {
   // Before the loop begins.
   void solve_elsewhere();
 
-  void start(const Dwell& dwell) noexcept SINERIG_NONBLOCKING;
+  // `by_detection`: its transient is not modelled.
+  void start(const Dwell& dwell, bool by_detection = false) noexcept SINERIG_NONBLOCKING;
 
   // One tick after the wait.
   void add(std::span<const Phasor> phasors,
@@ -80,6 +87,8 @@ class Measurement {
   // left more than the noise.
   bool modelled() const noexcept { return by_model_; }
   bool model_refuted() const noexcept { return modal_ && modal_->refuted(); }
+  // … or was drawn to be measured both ways.
+  const std::optional<Check>& check() const noexcept { return check_; }
   const ModePrior& modes() const noexcept { return modal_->modes(); }
   bool models() const noexcept { return modal_ && modal_->knows(); }
   // From here on transients are waited for.
@@ -103,6 +112,9 @@ class Measurement {
   }
   void start_modal() noexcept;
   void take_modal() noexcept;
+  bool drawn() const noexcept;
+  SettledBy settled_by() const noexcept;
+  void hold_against_model() noexcept;
   void restart() noexcept;
   void end_part() noexcept;
   Window current_window() noexcept;
@@ -133,6 +145,11 @@ class Measurement {
 
   std::unique_ptr<ModalDwell> modal_;  // where transients are modelled
   bool by_model_ = false;              // the model of its transient ended this dwell
+  bool by_detection_ = false;          // … is not to be modelled
+  bool at_limit_ = false;              // it ended because its time was up
+  bool checking_ = false;              // it has been modelled, and goes on
+  std::vector<Result> modelled_;       // per pair, of the dwell being checked
+  std::optional<Check> check_;
 
   const Dwell* dwell_ = nullptr;
   std::uint64_t samples_ = 0;  // since the start or the last disturbance

@@ -17,6 +17,13 @@ constexpr double burst_ratio = 25.0;
 
 }  // namespace
 
+SettledBy Measurement::settled_by() const noexcept {
+  if (judgement_.settling == Settling::fixed) return SettledBy::wait;
+  if (by_model_) return SettledBy::model;
+  if (check_) return SettledBy::both;
+  return modal_ && modal_->abandoned() ? SettledBy::fallback : SettledBy::detection;
+}
+
 Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const Result& each = result(pair, tone);
@@ -36,9 +43,7 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
   }
   const Interval half = interval(each);
   const double gain = std::abs(estimate.response);
-  point.settled_by = by_model_                                ? SettledBy::model
-                     : judgement_.settling == Settling::fixed ? SettledBy::wait
-                                                              : SettledBy::detection;
+  point.settled_by = settled_by();
   point.response = estimate.response;
   point.covariance = each.variance.covariance;
   point.dof = each.variance.dof;
@@ -73,6 +78,8 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
     mark(PointStatus::low_signal, PointReason::noise_burst, estimate.burst);
   } else if (estimate.own_distortion > judgement_.max_distortion) {
     mark(PointStatus::distorted, PointReason::harmonics, estimate.own_distortion);
+  } else if (by_model_ && at_limit_ && !target_met(pair)) {
+    mark(PointStatus::unsettled, PointReason::model_at_limit, half.gain_db);
   } else if (!target_met(pair)) {
     mark(PointStatus::low_signal, PointReason::target_not_reached, half.gain_db);
   } else if (!(gain > 0.0)) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace sinerig {
@@ -404,13 +405,15 @@ bool ModalSettling::fill_result(const ModalStore& store, std::size_t output) noe
   return true;
 }
 
-bool ModalSettling::target_met(double slack) const noexcept {
+// The half widths over the targets, the larger: the dwell is long enough at 1.
+double ModalSettling::target_excess() const noexcept {
   const ModalResult& result = results_[0];
-  if (result.variance.dof == 0.0) return false;
+  if (result.variance.dof == 0.0) return std::numeric_limits<double>::infinity();
   const Interval half = interval_of(result.estimate.response, result.variance, 0.0,
                                     std::max(1.0, result.variance.expected));
-  if (task_.target_db > 0.0 && !(half.gain_db <= slack * task_.target_db)) return false;
-  return !(task_.target_deg > 0.0) || half.phase_deg <= slack * task_.target_deg;
+  const double gain = task_.target_db > 0.0 ? half.gain_db / task_.target_db : 0.0;
+  const double phase = task_.target_deg > 0.0 ? half.phase_deg / task_.target_deg : 0.0;
+  return std::max(gain, phase);
 }
 
 // Hausman's test: the late half is free of what a wrong model of the transient does to the whole.
@@ -482,7 +485,8 @@ ModalVerdict ModalSettling::decide(const ModalStore& store) noexcept {
     doubt_ = ModalDoubt::not_a_sine;
     return ModalVerdict::abandoned;
   }
-  if (!fill_result(store, 0) || !target_met(1.0)) return ModalVerdict::going_on;
+  if (!fill_result(store, 0)) return ModalVerdict::going_on;
+  if (!(target_excess() <= 1.0)) return ModalVerdict::going_on;
   solver_.pole_covariance({posterior_.data(), triangle(prior_.parameters())});
   if (!late_half_agrees()) {
     // The oldest quarter goes.

@@ -3,6 +3,7 @@
 // what earlier dwells have taught.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <complex>
 #include <cstdint>
@@ -101,7 +102,7 @@ class ModalSettling {
   double noise_of_window(std::size_t output, const ModalSolution& solution) const noexcept;
   bool fill_result(const ModalStore& store, std::size_t output) noexcept;
   bool fit_input(const ModalStore& store) noexcept;
-  bool target_met(double slack) const noexcept;
+  double target_excess() const noexcept;
   ModalVerdict not_determined() noexcept;
   bool late_half_agrees() noexcept;
   bool residual_explained(std::size_t output) const noexcept;

@@ -27,7 +27,19 @@ constexpr double hardly = 0.05;
 
 }  // namespace
 
-ModelTrust::ModelTrust(std::size_t dwells) : modelled_(dwells), condemned_(dwells) {}
+ModelTrust::ModelTrust(std::size_t dwells)
+    : modelled_(dwells), condemned_(dwells), by_detection_(dwells) {}
+
+void ModelTrust::condemn(std::uint32_t dwell) noexcept {
+  condemned_[dwell] = 1;
+  by_detection_[dwell] = 1;
+  modelled_[dwell] = 0;
+}
+
+void ModelTrust::contradicted() noexcept {
+  contradicted_ = true;
+  doubted_ = true;
+}
 
 void ModelTrust::dwell_ended(std::uint32_t dwell, bool modelled, bool abandoned) noexcept {
   modelled_[dwell] = modelled ? 1 : 0;
@@ -39,8 +51,10 @@ ModelTrust::Judgement ModelTrust::probed(const KnownModes* found, const ModePrio
   doubted_ = false;
   recent_ = 0;
   ++probes_;
-  if (found != nullptr && same_modes(found->prior, used)) return Judgement::confirmed;
-  const bool give_up = found == nullptr || ++replacements_ > most_replacements;
+  const bool same = found != nullptr && same_modes(found->prior, used);
+  if (same && !contradicted_) return Judgement::confirmed;
+  const bool give_up = same || found == nullptr || ++replacements_ > most_replacements;
+  contradicted_ = false;
   for (std::size_t i = 0; i < modelled_.size(); ++i) {
     if (modelled_[i] != 0) condemned_[i] = 1;
     modelled_[i] = 0;

@@ -20,6 +20,10 @@ class ModelTrust {
   // neither.
   void dwell_ended(std::uint32_t dwell, bool modelled, bool abandoned) noexcept SINERIG_NONBLOCKING;
 
+  // A dwell measured both ways came out differently: whatever the modes, dwells are modelled
+  // wrongly.
+  void contradicted() noexcept SINERIG_NONBLOCKING;
+
   // So many of the last dwells were abandoned that the modes have to be found anew.
   bool doubted() const noexcept { return doubted_; }
 
@@ -31,20 +35,26 @@ class ModelTrust {
   };
   Judgement probed(const KnownModes* found, const ModePrior& used) noexcept SINERIG_NONBLOCKING;
 
-  // Points of this dwell were modelled with modes that turned out wrong.
+  // The dwell's points are the model's, and nothing has spoken against them.
+  bool modelled(std::uint32_t dwell) const noexcept { return modelled_[dwell] != 0; }
+  // Points of this dwell were modelled wrongly.
   bool condemned(std::uint32_t dwell) const noexcept { return condemned_[dwell] != 0; }
   // The next dwell to measure again at or after this one; `dwells` where there is none.
   std::uint32_t next_condemned(std::uint32_t from) const noexcept;
-  void condemn(std::uint32_t dwell) noexcept { condemned_[dwell] = 1; }
+  // It is to be measured again, by detection.
+  void condemn(std::uint32_t dwell) noexcept;
+  bool by_detection(std::uint32_t dwell) const noexcept { return by_detection_[dwell] != 0; }
   void acquit(std::uint32_t dwell) noexcept { condemned_[dwell] = 0; }
 
  private:
   std::vector<std::uint8_t> modelled_;
   std::vector<std::uint8_t> condemned_;
+  std::vector<std::uint8_t> by_detection_;
   std::uint32_t recent_ = 0;  // a bit per dwell, the last in the lowest: abandoned
   int probes_ = 0;
   int replacements_ = 0;
   bool doubted_ = false;
+  bool contradicted_ = false;
 };
 
 // Whether two sets of modes are the same within what is known of them. Real poles that are hardly

@@ -299,6 +299,13 @@ std::size_t SweepPlan::most_bins() const {
   return most;
 }
 
+double Judgement::relative_target() const {
+  if (!has_target()) return 1e-3;
+  const double gain = target_db > 0.0 ? target_db * std::numbers::ln10 / 20.0 : 1.0;
+  const double phase = target_deg > 0.0 ? target_deg * std::numbers::pi / 180.0 : 1.0;
+  return std::min(gain, phase);
+}
+
 double amplitude_at(const SweepSettings& sweep, double frequency_hz) {
   const double omega_rad_s = two_pi * frequency_hz;
   const double wanted = sweep.amplitude_table.empty()
@@ -324,6 +331,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
                     .target_db = sweep.target_db,
                     .target_deg = sweep.target_deg,
                     .target_of_first = sweep.target_of_first,
+                    .check_fraction = sweep.check_fraction,
                     .max_distortion = sweep.max_distortion};
   for (const AskedGroup& group : groups_of(asked, sweep.tones)) {
     const Dwell* before = plan.dwells.empty() ? nullptr : &plan.dwells.back();

@@ -79,7 +79,8 @@ struct SweepSettings {
   double ramp_s = 0.0;
 
   Settling settling = Settling::detect;
-  double probe_s = -1.0;  // model: length of the first pass; negative: of its own, 0: none
+  double check_fraction = 0.002;  // model: this part of the modelled dwells is measured both ways
+  double probe_s = -1.0;          // model: length of the first pass; negative: of its own, 0: none
   Span settle{.cycles = 0.0, .seconds = 0.0};           // waited for before anything is measured
   Span settle_max{.cycles = 20.0, .seconds = 20.0};     // detect: how long settling may take
   Span integrate{.cycles = 1.0, .seconds = 0.1};        // at least
@@ -156,9 +157,12 @@ struct Judgement {
   double target_db = 0.0;  // 0 = none
   double target_deg = 0.0;
   bool target_of_first = false;  // the other responses take what its windows give
+  double check_fraction = 0.0;   // of the modelled dwells: detected as well
   double max_distortion = 0.1;  // more than this part of the tone in harmonics is a distorted point
 
   bool has_target() const { return target_db > 0.0 || target_deg > 0.0; }
+  // The tighter of the targets as a part of the response; a thousandth where there is none.
+  double relative_target() const;
 };
 
 // What may be measured after the first pass, where the response between two points is not known.

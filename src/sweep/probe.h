@@ -39,6 +39,9 @@ class Prober {
   // The waveform begins with this tick.
   bool begins() noexcept { return std::exchange(begins_, false); }
 
+  // Nothing has to be found.
+  void skip() noexcept { stage_ = Stage::done; }
+
   // The modes have to be found once more.
   void again() noexcept SINERIG_NONBLOCKING;
 

@@ -20,6 +20,8 @@ const char* to_string(SettledBy way) noexcept {
     case SettledBy::wait: return "wait";
     case SettledBy::detection: return "detection";
     case SettledBy::model: return "model";
+    case SettledBy::fallback: return "fallback";
+    case SettledBy::both: return "both";
   }
   return "unknown";
 }
@@ -31,6 +33,7 @@ const char* to_string(PointReason reason) noexcept {
     case PointReason::no_response: return "no_response";
     case PointReason::stuck: return "stuck";
     case PointReason::still_moving: return "still_moving";
+    case PointReason::model_at_limit: return "model_at_limit";
     case PointReason::target_not_reached: return "target_not_reached";
     case PointReason::harmonics: return "harmonics";
     case PointReason::noise_burst: return "noise_burst";
@@ -47,6 +50,8 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::started: return "started";
     case EventKind::probed: return "probed";
     case EventKind::model_doubted: return "model_doubted";
+    case EventKind::checked: return "checked";
+    case EventKind::condemned: return "condemned";
     case EventKind::remeasured: return "remeasured";
     case EventKind::dwell_began: return "dwell_began";
     case EventKind::retried: return "retried";

@@ -44,6 +44,7 @@ enum class PointReason : std::uint8_t {
   output_at_range,     // part of the samples with Fault::range
   gaps,                // times the dwell had to settle again
   still_moving,        // the late half differs from the whole by this, dB
+  model_at_limit,      // the dwell was over before its model met the target; as below
   target_not_reached,  // half width of the gain's interval at the end, dB
   harmonics,           // of the output, relative to the tone
   noise_burst,         // power of the loudest cluster over that of the others
@@ -58,6 +59,8 @@ enum class SettledBy : std::uint8_t {
   wait,       // waited for a fixed time
   detection,  // seen to go
   model,      // regressed along
+  fallback,   // its model was abandoned; then seen to go
+  both,       // regressed along, then seen to go: a modelled dwell that was checked
 };
 
 const char* to_string(SettledBy way) noexcept;
@@ -135,11 +138,14 @@ enum class EventKind : std::uint8_t {
   started,
   probed,  // the first pass has ended; value: modes found
   dwell_began,
-  model_doubted,   // value: what came of it: 0 confirmed, 1 replaced, 2 given up
-  remeasured,      // the dwell begins once more: its model turned out wrong
-  retried,         // value: amplitude of the next try
-  refined,         // a dwell was added; value: disagreement that called for it, dB; candidate
-  gap,             // value: ticks skipped
+  model_doubted,  // value: what came of it: 0 confirmed, 1 replaced, 2 given up, 3 see review()
+  checked,        // a modelled dwell, by detection; value: disagreement, dB; see Check
+  condemned,   // its points have to be measured again; value: disagreement, dB, with the model of
+               // the sweep; 0: its modes turned out wrong
+  remeasured,  // the dwell begins once more: its model turned out wrong
+  retried,     // value: amplitude of the next try
+  refined,     // a dwell was added; value: disagreement that called for it, dB; candidate
+  gap,         // value: ticks skipped
   actuator_fault,  // detail: Fault
   sensor_fault,    // channel, detail: Fault; the first of a run of them
   sensor_recovered,

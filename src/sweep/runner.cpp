@@ -74,6 +74,11 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
               !settings_.modes,
               settings_.real_time ? Deputy::Where::own_thread : Deputy::Where::at_once},
       trust_{dwells_.capacity()},
+      review_{plan_.judgement.settling == Settling::model ? dwells_.capacity() : 0,
+              settings_.responses.size(), plan_.rate_hz, plan_.judgement.relative_target(),
+              settings_.real_time && plan_.judgement.settling == Settling::model
+                  ? Deputy::Where::own_thread
+                  : Deputy::Where::at_once},
       observations_(1 + sensors.size()),
       sensor_faults_(sensors.size(), Fault::none),
       preflight_{settings_.preflight.wanted} {
@@ -112,14 +117,16 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const Tick tick = clock_.wait();
   const std::uint64_t ticks = std::exchange(from_rest_, false) ? 1 : tick.index - last_tick_;
 
-  const bool closing = dwell_ == dwells_.size();
-  const bool probing = !closing && !preflight_ && prober_.running();
-  const bool new_dwell = !closing && !probing && !run_.begun();
+  const bool closing = this->closing();
+  const bool reviewing = review_.asked();
+  const bool probing = !closing && !reviewing && !preflight_ && prober_.running();
+  const bool between_dwells = probing || reviewing;
+  const bool new_dwell = !closing && !between_dwells && !run_.begun();
   if (new_dwell) begin_dwell(tick.index + 1 - ticks);
   const bool probe_begins = probing && prober_.begins();
   if (probe_begins) excitation_.start(plan_.probe.command, plan_.probe.quiet_samples / 2);
   excitation_.advance(new_dwell || probe_begins ? ticks - 1 : ticks);
-  if (!probing) run_.pass(tick, ticks);
+  if (!between_dwells) run_.pass(tick, ticks);
   ++outcome_.ticks;
   last_tick_ = tick.index;
 
@@ -139,7 +146,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
 
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
-    return guard_.trip().soft && !closing && !probing && pause(ticks);
+    return guard_.trip().soft && !closing && !between_dwells && pause(ticks);
   }
   if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();
@@ -147,6 +154,8 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool disturbed = ticks > 1 || late || command_lost_ || command_late_;
   if (probing) {
     probe(disturbed);
+  } else if (reviewing) {
+    if (review_.ready()) hear_review();
   } else {
     run_.measure(tick.index, observations_, disturbed);
     if (run_.over()) conclude_dwell();
@@ -157,7 +166,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
 
 // False at the end of the plan, where nothing is left to be taken back to neutral.
 bool SweepRunner::keep_going() noexcept {
-  if (dwell_ < dwells_.size()) return true;
+  if (!closing()) return true;
   excitation_.close();
   return !excitation_.closed();
 }

@@ -21,6 +21,7 @@
 #include "sweep/refiner.h"
 #include "sweep/run_control.h"
 #include "sweep/runner_settings.h"
+#include "sweep/sweep_review.h"
 
 namespace sinerig {
 
@@ -35,9 +36,10 @@ struct RunOutcome {
 
 // What an earlier, interrupted run of the same plan has left.
 struct FinishedDwells {
-  std::uint32_t dwells = 0;        // finished, from the first on: the run goes on with the next
-  std::vector<Point> points;       // theirs, of all tones and responses
-  std::vector<Lesson> lessons;     // in the order in which they were taught
+  std::uint32_t dwells = 0;     // finished, from the first on: the run goes on with the next
+  std::vector<Point> points;    // theirs, of all tones and responses
+  std::vector<Lesson> lessons;  // in the order in which they were taught
+  std::vector<std::uint32_t> condemned;  // of them: to be measured again by detection
   std::uint32_t known_dwells = 0;  // dwells that are on record, those added by refinement included
 };
 
@@ -74,6 +76,11 @@ class SweepRunner {
   void conclude_dwell() noexcept;
   bool pass_preflight() noexcept;
   void judge_model() noexcept;
+  void check_model() noexcept;
+  void next_condemned() noexcept;
+  void review() noexcept;
+  void hear_review() noexcept;
+  bool closing() const noexcept { return dwell_ == dwells_.size() && !review_.asked(); }
   bool try_again() noexcept;
   void repeat_dwell() noexcept;
   void tell_trip(EventKind kind) noexcept;
@@ -103,6 +110,8 @@ class SweepRunner {
   DwellRun run_;
   Prober prober_;
   ModelTrust trust_;
+  SweepReview review_;
+  int reviews_ = 0;
   bool remeasuring_ = false;               // what was modelled with modes that turned out wrong
   std::vector<Observation> observations_;  // applied, sensors: this tick
   double command_ = 0.0;                   // this tick

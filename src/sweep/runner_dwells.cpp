@@ -2,12 +2,28 @@
 // itself is in runner.cpp.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <utility>
 
 #include "sweep/runner.h"
 
 namespace sinerig {
+
+namespace {
+
+constexpr double relative_to_db = 20.0 / std::numbers::ln10;
+
+// Once what disagrees has been measured again, others may stand out.
+constexpr int most_reviews = 3;
+
+// One of so many modelled points may stray and be measured again.
+constexpr std::uint32_t most_strays = 8;
+
+// Beside what ModelTrust::Judgement says.
+constexpr double review_inconclusive = 3.0;
+
+}  // namespace
 
 // After the actuator has been released: true when everything is armed again and the dwell begins
 // anew.
@@ -96,6 +112,8 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
            ++point) {
         if (point->pair == 0 && tone == 0) leveller_.accept(*point);
         teach_refiner(*point);
+        if (plan_.judgement.settling == Settling::model) review_.set(*point);
+        if (point->settled_by == SettledBy::model) trust_.dwell_ended(dwell_, true, false);
       }
       refiner_.learn();
     }
@@ -105,6 +123,13 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
   }
   for (; lesson != finished.lessons.end() && dwell_ < dwells_.size(); ++lesson) {
     run_.recall(*lesson, *dwells_[dwell_]);
+  }
+  for (const std::uint32_t dwell : finished.condemned) trust_.condemn(dwell);
+  if (dwell_ == dwells_.size()) {
+    // What is left is measured by detection.
+    prober_.skip();
+    remeasuring_ = true;
+    next_condemned();
   }
   return dwell_ < dwells_.size();
 }
@@ -116,7 +141,11 @@ void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
     if (preflight_) scale_ = std::min(scale_, settings_.preflight.level);
   }
   excitation_.start(dwell, scale_);
-  run_.begin(dwell, dwell_, attempt_, scale_, tick);
+  if (remeasuring_ && trust_.condemned(dwell_)) {
+    trust_.acquit(dwell_);
+    announce({.kind = EventKind::remeasured, .dwell = dwell_, .tick = tick});
+  }
+  run_.begin(dwell, dwell_, attempt_, scale_, tick, trust_.by_detection(dwell_));
   announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
 }
 
@@ -132,14 +161,25 @@ void SweepRunner::conclude_dwell() noexcept {
   }
   if (try_again()) return;
   finish_dwell();
-  const Measurement& measurement = run_.measurement();
-  trust_.dwell_ended(dwell_, measurement.modelled(), measurement.model_refuted());
+  check_model();
   if (!trust_.doubted()) {
     next_dwell();
     return;
   }
   prober_.again();
   if (!prober_.running()) judge_model();  // nobody can find them
+}
+
+void SweepRunner::check_model() noexcept {
+  const Measurement& measurement = run_.measurement();
+  trust_.dwell_ended(dwell_, measurement.modelled(), measurement.model_refuted());
+  const std::optional<Check>& check = measurement.check();
+  if (!check) return;
+  announce({.kind = EventKind::checked,
+            .dwell = dwell_,
+            .tick = last_tick_,
+            .value = relative_to_db * check->disagreement});
+  if (!check->agrees) trust_.contradicted();
 }
 
 // The first pass, in which the modes are found.
@@ -160,6 +200,10 @@ void SweepRunner::judge_model() noexcept {
               .dwell = dwell_,
               .tick = last_tick_,
               .value = static_cast<double>(judgement)});
+    for (std::uint32_t dwell = 0; dwell < dwells_.size(); ++dwell) {
+      if (judgement == ModelTrust::Judgement::confirmed || !trust_.condemned(dwell)) continue;
+      announce({.kind = EventKind::condemned, .dwell = dwell, .tick = last_tick_});
+    }
     if (judgement == ModelTrust::Judgement::given_up) measurement.stop_modelling();
     // Confirmed modes, too: what dwells have made of them was doubted.
     use = found != nullptr && judgement != ModelTrust::Judgement::given_up;
@@ -206,11 +250,52 @@ void SweepRunner::next_dwell() noexcept {
     if (dwell_ == dwells_.size()) refine();
     remeasuring_ = dwell_ == dwells_.size();
   }
-  if (!remeasuring_) return;
+  if (remeasuring_) next_condemned();
+}
+
+void SweepRunner::next_condemned() noexcept {
   dwell_ = std::min(trust_.next_condemned(0), static_cast<std::uint32_t>(dwells_.size()));
-  if (dwell_ == dwells_.size()) return;
-  trust_.acquit(dwell_);
-  announce({.kind = EventKind::remeasured, .dwell = dwell_, .tick = last_tick_});
+  if (dwell_ == dwells_.size()) review();
+}
+
+// All dwells are done: is there one that the others contradict?
+void SweepRunner::review() noexcept {
+  if (reviews_ == most_reviews || !run_.measurement().models()) return;
+  ++reviews_;
+  review_.ask(run_.measurement().modes());
+  if (review_.ready()) hear_review();
+}
+
+void SweepRunner::hear_review() noexcept {
+  review_.close();
+  const auto strays = [&](std::uint32_t dwell) {
+    return trust_.modelled(dwell) && review_.disagreement(dwell) > 0.0;
+  };
+  std::uint32_t modelled = 0;
+  std::uint32_t stray = 0;
+  for (std::uint32_t dwell = 0; dwell < dwells_.size(); ++dwell) {
+    modelled += trust_.modelled(dwell) ? 1U : 0U;
+    stray += strays(dwell) ? 1U : 0U;
+  }
+  if (stray == 0) return;
+  // Where many stray, it is the model of the sweep that is too small: said, not acted upon.
+  if (stray > std::max(1U, modelled / most_strays)) {
+    announce({.kind = EventKind::model_doubted,
+              .dwell = dwell_,
+              .tick = last_tick_,
+              .value = review_inconclusive});
+    return;
+  }
+  for (std::uint32_t dwell = 0; dwell < dwells_.size(); ++dwell) {
+    if (!strays(dwell)) continue;
+    const double disagreement = review_.disagreement(dwell);
+    trust_.condemn(dwell);
+    announce({.kind = EventKind::condemned,
+              .dwell = dwell,
+              .tick = last_tick_,
+              .value = relative_to_db * disagreement});
+  }
+  next_condemned();
 }
 
 // One more dwell where the response between two points is not known.
@@ -257,6 +342,7 @@ void SweepRunner::finish_dwell() noexcept {
       const Point point = run_.point(pair, tone);
       sink_.put(point);
       teach_refiner(point);
+      if (plan_.judgement.settling == Settling::model) review_.set(point);
     }
     refiner_.learn();
   }

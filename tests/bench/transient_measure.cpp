@@ -73,7 +73,8 @@ void print_sweep(std::uint64_t seed, const QualityCase& cell, const test::Virtua
   }
   for (const Event& event : run.sink.events) {
     const bool telling = event.kind == EventKind::model_doubted ||
-                         event.kind == EventKind::probed || event.kind == EventKind::remeasured;
+                         event.kind == EventKind::probed || event.kind == EventKind::remeasured ||
+                         event.kind == EventKind::checked || event.kind == EventKind::condemned;
     if (telling) std::printf(" %s(%u) %g;", to_string(event.kind), event.dwell, event.value);
   }
   std::printf("\n");

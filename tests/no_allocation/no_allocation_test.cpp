@@ -72,8 +72,19 @@ struct LoopCase {
   const char* name;
   void (*arrange)(sim::SimulatedRigSettings&, GuardSettings&);
   bool gaps = false;
+  bool modelled = false;
   void (*plant)() = nullptr;
 };
+
+// Nearly those of the rig: modelled dwells, doubted ones and their fall-back all happen.
+KnownModes told_modes() {
+  KnownModes known{.prior = {}, .noise_variance = {1e-12, 1e-10}, .noise_dof = 100.0};
+  known.prior.modes = 2;
+  known.prior.poles[0] = {.sigma_rad_s = -2.5, .omega_rad_s = 12.0};
+  known.prior.poles[1] = {.sigma_rad_s = -1.45, .omega_rad_s = 144.5};
+  for (std::size_t i = 0; i < 4; ++i) known.prior.covariance[triangle(i) + i] = 0.5;
+  return known;
+}
 
 std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
   SweepSettings sweep;
@@ -84,6 +95,10 @@ std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
   sweep.ramp_s = 0.05;
   sweep.settle_max = {.cycles = 4.0, .seconds = 1.0};
   sweep.integrate_max = {.cycles = 4.0, .seconds = 1.0};
+  if (loop.modelled) {
+    sweep.settling = Settling::model;
+    sweep.check_fraction = 0.3;
+  }
   const SweepPlan plan = plan_sweep(sweep, {}, 1000.0);
 
   sim::SimulatedRigSettings rig_settings;
@@ -107,10 +122,9 @@ std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
   Sensor* const sensors[] = {&first, &rig.sensor(1)};
   Guard guard{guard_settings, clock.grid().period_s()};
   Outbox outbox{1 << 12, 1 << 12, Outbox::WhenFull::keep};  // never emptied: it runs full as well
-  SweepRunner runner{plan,    {.responses = {}, .readbacks = {}, .record_samples = true},
-                     clock,   actuator,
-                     sensors, guard,
-                     outbox};
+  RunnerSettings settings{.responses = {}, .readbacks = {}, .record_samples = true};
+  if (loop.modelled) settings.modes = told_modes();
+  SweepRunner runner{plan, settings, clock, actuator, sensors, guard, outbox};
   RunControl control;
   runner.run(control);
   return actuator.allocations.value();
@@ -152,6 +166,9 @@ INSTANTIATE_TEST_SUITE_P(
                                                                    .stuck_at_s = 20.0};
                                  }},
                     LoopCase{.name = "WithGaps", .arrange = [](auto&, auto&) {}, .gaps = true},
+                    LoopCase{.name = "WithModelledTransients",
+                             .arrange = [](auto&, auto&) {},
+                             .modelled = true},
                     LoopCase{.name = "StoppedByALimit",
                              .arrange =
                                  [](auto&, auto& guard) {

@@ -93,6 +93,27 @@ TEST_F(ResumedFile, GoesOnWithTheDwellThatWasStopped) {
   EXPECT_GE(run.start.tick, 15000U);
 }
 
+// All dwells were finished; two were condemned, and one of them has been measured again.
+TEST_F(ResumedFile, KnowsWhatIsStillToBeMeasuredAgain) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    for (std::uint32_t id = 0; id < 4; ++id) dwell(writer, id, 5000 * id);
+    for (const std::uint32_t id : {1U, 2U, 3U})
+      writer.write(Event{.kind = EventKind::condemned, .dwell = id, .tick = 20000});
+    writer.write(Event{.kind = EventKind::remeasured, .dwell = 1, .tick = 20001});
+    dwell(writer, 1, 20001);
+    writer.write(Event{.kind = EventKind::remeasured, .dwell = 2, .tick = 25001});
+    dwell(writer, 2, 25001, PointStatus::stopped);
+    writer.end_part("interrupted", "stop requested");
+    writer.finish();
+  }
+  const UnfinishedRun run = read_unfinished(path());
+  EXPECT_FALSE(run.done());
+  EXPECT_EQ(run.finished.dwells, 4U);
+  EXPECT_EQ(run.finished.condemned, (std::vector<std::uint32_t>{2, 3}));
+}
+
 TEST_F(ResumedFile, KeepsWhatWasFinishedAndReplacesTheStoppedPoint) {
   first_part();
   const auto before = texts("SELECT quote(re) || quote(im) FROM point WHERE dwell < 2");

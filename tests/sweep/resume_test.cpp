@@ -54,7 +54,8 @@ Measured run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells&
 
 // What a file would hold of the first dwells of a run.
 FinishedDwells first_of(const Measured& run, std::uint32_t dwells, std::uint32_t known) {
-  FinishedDwells finished{.dwells = dwells, .points = {}, .lessons = {}, .known_dwells = known};
+  FinishedDwells finished{
+      .dwells = dwells, .points = {}, .lessons = {}, .condemned = {}, .known_dwells = known};
   for (const Point& point : run.sink.points) {
     if (point.dwell < dwells) finished.points.push_back(point);
   }
