@@ -38,6 +38,9 @@ struct ModalTask {
   std::uint64_t least_samples = 0;  // of the window
   double target_db = 0.0;           // half widths wanted; 0: none
   double target_deg = 0.0;
+
+  // The smaller of them, relative to H; 1 where there is none.
+  double relative_target() const noexcept;
 };
 
 struct ModalResult {

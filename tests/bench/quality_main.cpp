@@ -1,11 +1,9 @@
 #include <atomic>
-#include <cstdio>
-#include <cstring>
-#include <exception>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "parts.h"
 #include "quality.h"
 
 namespace sinerig::quality {
@@ -23,66 +21,35 @@ void in_parallel(std::size_t count, unsigned threads,
 
 namespace {
 
-struct Part {
-  const char* name;
-  int (*run)(const Options&);
-};
-
-constexpr Part parts[] = {
+constexpr bench::Part<Options> parts[] = {
     {"coverage", coverage}, {"transient", transient},  {"efficiency", efficiency}, {"bias", bias},
     {"time", bench_time},   {"tones", parallel_tones}, {"status", status},         {"cost", cost},
 };
 
-int usage() {
-  std::fprintf(stderr,
-               "quality [coverage|transient|efficiency|bias|time|tones|status|cost] [--seeds N] "
-               "[--first-seed K] [--threads N]\nWithout a part: all of them.\n");
-  return 2;
-}
+constexpr const char* usage =
+    "quality [coverage|transient|efficiency|bias|time|tones|status|cost] [--seeds N] "
+    "[--first-seed K] [--threads N]\nWithout a part: all of them.\n";
 
-int run(int argc, char** argv) {
-  Options options;
-  options.rigs = SINERIG_SOURCE_DIR "/config/quality";
-  std::vector<const Part*> chosen;
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    if (word.starts_with("--")) {
-      if (i + 1 == argc) return usage();
-      const auto value = std::stoull(argv[++i]);
-      if (word == "--seeds") {
-        options.seeds = static_cast<std::uint32_t>(value);
-      } else if (word == "--first-seed") {
-        options.first_seed = value;
-      } else if (word == "--threads") {
-        options.threads = static_cast<unsigned>(value);
-      } else {
-        return usage();
-      }
-      continue;
-    }
-    const auto known = chosen.size();
-    for (const Part& part : parts) {
-      if (word == part.name) chosen.push_back(&part);
-    }
-    if (chosen.size() == known) return usage();
+bool option(const std::string& word, bench::Words& words, Options& options) {
+  if (word == "--seeds") {
+    options.seeds = static_cast<std::uint32_t>(std::stoul(words.take()));
+  } else if (word == "--first-seed") {
+    options.first_seed = std::stoull(words.take());
+  } else if (word == "--threads") {
+    options.threads = static_cast<unsigned>(std::stoul(words.take()));
+  } else {
+    return false;
   }
-  if (chosen.empty()) {
-    for (const Part& part : parts) chosen.push_back(&part);
-  }
-  int missed = 0;
-  for (const Part* part : chosen) missed += part->run(options);
-  std::printf("\n%d bound%s missed\n", missed, missed == 1 ? "" : "s");
-  return missed == 0 ? 0 : 1;
+  return true;
 }
 
 }  // namespace
 }  // namespace sinerig::quality
 
 int main(int argc, char** argv) {
-  try {
-    return sinerig::quality::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "quality: %s\n", error.what());
-    return 1;
-  }
+  using namespace sinerig;
+  quality::Options options;
+  options.rigs = SINERIG_SOURCE_DIR "/config/quality";
+  return bench::run_parts<quality::Options>(argc, argv, quality::parts, options, quality::option,
+                                            quality::usage);
 }

@@ -4,11 +4,11 @@
 #include <cstdio>
 #include <cstring>
 #include <ctime>
-#include <exception>
 #include <numbers>
 #include <string>
 #include <vector>
 
+#include "parts.h"
 #include "sweep/modal_regression.h"
 #include "sweep/modal_store.h"
 #include "transient.h"
@@ -164,63 +164,36 @@ int tick(const Options&) {
 
 namespace {
 
-struct Part {
-  const char* name;
-  int (*run)(const Options&);
-};
-constexpr Part parts[] = {
+constexpr bench::Part<Options> parts[] = {
     {"time", bench_time}, {"coverage", coverage}, {"order", order}, {"tick", tick}};
 
-int usage() {
-  std::fprintf(
-      stderr,
-      "transient [time|coverage|order|tick] [--seeds N] [--first-seed S] [--case g1_80 …] "
-      "[--each]\n"
-      "Without a part: all of them. Cases: g1 to g4, _80, _60 and _20 dB. --each tells of every "
-      "sweep.\n");
-  return 2;
-}
+constexpr const char* usage =
+    "transient [time|coverage|order|tick] [--seeds N] [--first-seed S] [--case g1_80 …] [--each]\n"
+    "Without a part: all of them. Cases: g1 to g4, _80, _60 and _20 dB. --each tells of every "
+    "sweep.\n";
 
-int run(int argc, char** argv) {
-  Options options;
-  options.rigs = SINERIG_SOURCE_DIR "/config/quality";
-  std::vector<const Part*> chosen;
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    const bool last = i + 1 == argc;
-    const auto part = std::find_if(std::begin(parts), std::end(parts),
-                                   [&](const Part& each) { return word == each.name; });
-    if (part != std::end(parts)) {
-      chosen.push_back(part);
-    } else if (word == "--seeds" && !last) {
-      options.seeds = static_cast<std::uint32_t>(std::stoul(argv[++i]));
-    } else if (word == "--first-seed" && !last) {
-      options.first_seed = std::stoull(argv[++i]);
-    } else if (word == "--each") {
-      options.each = true;
-    } else if (word == "--case" && !last) {
-      while (i + 1 < argc && argv[i + 1][0] == 'g') options.cases.emplace_back(argv[++i]);
-    } else {
-      return usage();
-    }
+bool option(const std::string& word, bench::Words& words, Options& options) {
+  if (word == "--seeds") {
+    options.seeds = static_cast<std::uint32_t>(std::stoul(words.take()));
+  } else if (word == "--first-seed") {
+    options.first_seed = std::stoull(words.take());
+  } else if (word == "--each") {
+    options.each = true;
+  } else if (word == "--case") {
+    while (words.left() && words.peek().starts_with('g')) options.cases.push_back(words.take());
+  } else {
+    return false;
   }
-  if (chosen.empty()) {
-    for (const Part& part : parts) chosen.push_back(&part);
-  }
-  int missed = 0;
-  for (const Part* part : chosen) missed += part->run(options);
-  std::printf("\n%d bound%s missed\n", missed, missed == 1 ? "" : "s");
-  return missed == 0 ? 0 : 1;
+  return true;
 }
 
 }  // namespace
 }  // namespace sinerig::transient
 
 int main(int argc, char** argv) {
-  try {
-    return sinerig::transient::run(argc, argv);
-  } catch (const std::exception& error) {
-    std::fprintf(stderr, "transient: %s\n", error.what());
-    return 1;
-  }
+  using namespace sinerig;
+  transient::Options options;
+  options.rigs = SINERIG_SOURCE_DIR "/config/quality";
+  return bench::run_parts<transient::Options>(argc, argv, transient::parts, options,
+                                              transient::option, transient::usage);
 }
