@@ -81,6 +81,7 @@ void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& excha
   const ExchangePlan& plan = order.commands ? commanding_plan_ : reading_plan_;
   const std::int64_t deadline_ns = exchange.begun_ns + patience_ns;
   bool failed = false;
+  bool lost = false;
   exchange.withheld = false;
   ++asked_;
   for (std::size_t n = 0; n < plan.questions.size() && !(too_old && order.commands); ++n) {
@@ -100,6 +101,7 @@ void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& excha
                                                                 : CommandFate::unconfirmed;
     }
     exchange.withheld = exchange.withheld || answer.withheld;
+    lost = lost || (answer.outcome != Outcome::ok && !answer.withheld);
     if (answer.outcome != Outcome::ok) {
       failed = true;
       // Why the connection went is worth more than that it is still gone.
@@ -119,6 +121,8 @@ void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& excha
     }
     if (!transport_.connected()) break;
   }
+  // One that asked for something and got no answer has failed, whatever else it held back.
+  exchange.withheld = exchange.withheld && !lost;
   exchange.ended_ns = monotonic_now_ns();
   if (plan.questions.empty() || transport_.connected())
     pace_.add(exchange.ended_ns - exchange.begun_ns, failed);

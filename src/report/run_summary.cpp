@@ -42,7 +42,9 @@ Json transient_fact(const std::vector<StoredPoint>& points) {
   if (modelled == 0) return nullptr;
   return {"Transients modelled",
           text("%td of %zu", static_cast<std::ptrdiff_t>(modelled), points.size()),
-          text("%td seen to go", static_cast<std::ptrdiff_t>(settled_by("detection")))};
+          text("%td seen to go",
+               static_cast<std::ptrdiff_t>(settled_by("detection") + settled_by("fallback") +
+                                           settled_by("both")))};
 }
 
 Json peak_fact(const StoredRun& run) {

@@ -27,6 +27,12 @@ double angular_frequency(const Dwell& dwell, const Tone& tone, double rate_hz) {
 
 }  // namespace
 
+std::vector<std::size_t> outputs_of(const Pairs& pairs) {
+  std::vector<std::size_t> outputs;
+  for (const Pair& pair : pairs) outputs.push_back(pair.output);
+  return outputs;
+}
+
 Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t max_tones,
                          Pairs pairs, Judgement judgement, double rate_hz)
     : pairs_{std::move(pairs)},
@@ -43,9 +49,7 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
       omega_(max_bins),
       modelled_(pairs_.size()) {
   if (judgement_.settling != Settling::model) return;
-  std::vector<std::size_t> outputs;
-  for (const Pair& pair : pairs_) outputs.push_back(pair.output);
-  modal_ = std::make_unique<ModalDwell>(channels, std::move(outputs), rate_hz);
+  modal_ = std::make_unique<ModalDwell>(channels, outputs_of(pairs_), rate_hz);
 }
 
 void Measurement::solve_elsewhere() {
@@ -147,7 +151,10 @@ void Measurement::add(std::span<const Phasor> phasors,
     done_ = true;
     return;
   }
-  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) modelled_[pair] = result(pair, 0);
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    modelled_[pair] = result(pair, 0);
+    result(pair, 0).still = false;  // until it is seen
+  }
   by_model_ = false;
   checking_ = true;
 }
@@ -163,14 +170,23 @@ bool Measurement::drawn() const noexcept {
   return std::ldexp(static_cast<double>(bits >> 11U), -53) < judgement_.check_fraction;
 }
 
-// What the model has said and what is seen now that the transient has gone. Where it has not, the
-// model's word stands.
+void Measurement::take_back_modelled() noexcept {
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) result(pair, 0) = modelled_[pair];
+  by_model_ = true;
+  at_limit_ = false;  // its model had ended it
+}
+
+// What the model has said and what is seen now that the transient has gone. Where it has not, or
+// where less is known so late than the model knew and both agree, the model's word stands.
 void Measurement::hold_against_model() noexcept {
   bool gone = true;
-  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) gone = gone && result(pair, 0).still;
+  bool enough = true;
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    gone = gone && (result(pair, 0).still || !result(pair, 0).known);
+    enough = enough && (result(pair, 0).known || !modelled_[pair].known) && target_met(pair);
+  }
   if (!gone) {
-    for (std::size_t pair = 0; pair < pairs_.size(); ++pair) result(pair, 0) = modelled_[pair];
-    by_model_ = true;
+    take_back_modelled();
     return;
   }
   check_ = Check{};
@@ -188,6 +204,7 @@ void Measurement::hold_against_model() noexcept {
     check_->agrees = check_->agrees && agrees;
     check_->disagreement = std::max(check_->disagreement, apart);
   }
+  if (check_->agrees && !enough) take_back_modelled();
 }
 
 void Measurement::end_part() noexcept {

@@ -31,6 +31,9 @@ struct Check {
 // A dwell goes on until all have settled and, unless the target is of the first only, meet it.
 using Pairs = std::vector<Pair>;
 
+// The output channel of each.
+std::vector<std::size_t> outputs_of(const Pairs& pairs);
+
 class Measurement {
  public:
   // Takes all memory for dwells of up to `max_bins` bins.
@@ -115,6 +118,7 @@ class Measurement {
   bool drawn() const noexcept;
   SettledBy settled_by() const noexcept;
   void hold_against_model() noexcept;
+  void take_back_modelled() noexcept;
   void restart() noexcept;
   void end_part() noexcept;
   Window current_window() noexcept;
@@ -123,6 +127,7 @@ class Measurement {
   void look_for_transient(std::size_t pair, const Window& window) noexcept;
   bool target_met(std::size_t pair) const noexcept;
   double settling_tolerance() const noexcept;
+  std::size_t parts_per_block() const noexcept;
   Result& result(std::size_t pair, std::size_t tone) noexcept {
     return results_[pair * max_tones_ + tone];
   }

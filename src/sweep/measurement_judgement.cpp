@@ -11,9 +11,6 @@ namespace sinerig {
 
 namespace {
 
-constexpr double db_per_relative = 20.0 / std::numbers::ln10;
-constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
-
 // The regression's channel of what was applied.
 constexpr std::size_t applied_row = 0;
 
@@ -60,13 +57,18 @@ constexpr double default_settling_tolerance = 1e-3;
 
 }  // namespace
 
+// Checkpoints of the regression in a block.
+std::size_t Measurement::parts_per_block() const noexcept {
+  return std::max<std::size_t>(1, dwell_->parts / stride_);
+}
+
 Window Measurement::current_window() noexcept {
   while (stride_ < regression_.stride()) {
     stride_ *= 2;
     first_ = (first_ + 1) / 2;
   }
   const std::size_t last = regression_.checkpoints() - 1;
-  const std::size_t per_block = std::max<std::size_t>(1, dwell_->parts / stride_);
+  const std::size_t per_block = parts_per_block();
   const std::size_t blocks = (last - first_) / per_block;
   Window window{.first = first_, .last = last, .settled = judgement_.settling == Settling::fixed};
   if (whole_blocks_ && blocks > 0) {
@@ -95,18 +97,15 @@ bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {
 }
 
 double Measurement::settling_tolerance() const noexcept {
-  const double gain = judgement_.target_db / db_per_relative;
-  const double phase = judgement_.target_deg / degrees_per_radian;
-  if (gain > 0.0 && phase > 0.0) return settling_part_of_target * std::min(gain, phase);
-  if (judgement_.has_target()) return settling_part_of_target * std::max(gain, phase);
-  return default_settling_tolerance;
+  return judgement_.has_target() ? settling_part_of_target * judgement_.relative_target()
+                                 : default_settling_tolerance;
 }
 
 // Were the window free of the transient, its late half would stray from the whole only by noise
 // (Hausman's test). Nor can the transient have left more than it began with, averaged over the
 // radians that it turned against the tone.
 void Measurement::look_for_transient(std::size_t pair, const Window& window) noexcept {
-  const std::size_t per_block = std::max<std::size_t>(1, dwell_->parts / stride_);
+  const std::size_t per_block = parts_per_block();
   const std::size_t blocks = (window.last - window.first) / per_block;
   // Half of the window in whole blocks, which see no harmonics; half of a short one.
   const std::size_t half = blocks >= 2 ? blocks / 2 * per_block : (window.last - window.first) / 2;

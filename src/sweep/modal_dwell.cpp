@@ -69,6 +69,7 @@ void ModalDwell::add(Phasor tone, std::span<const Observation> observations) noe
 void ModalDwell::hear() noexcept {
   looking_ = false;
   verdict_ = answer_;
+  modes_ = settling_.prior();
   live_ = verdict_ == ModalVerdict::going_on;
 }
 

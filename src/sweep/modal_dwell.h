@@ -29,10 +29,12 @@ class ModalDwell {
   void know(const ModePrior& prior, std::span<const double> noise_variance,
             double noise_dof) noexcept SINERIG_NONBLOCKING {
     settling_.know(prior, noise_variance, noise_dof);
+    modes_ = settling_.prior();
   }
   bool knows() const noexcept { return settling_.knows(); }
   void forget() noexcept { settling_.forget(); }
-  const ModePrior& modes() const noexcept { return settling_.prior(); }
+  // As last heard of: the solver may be at work on its own.
+  const ModePrior& modes() const noexcept { return modes_; }
 
   // The dwell begins, or begins anew; it is not modelled.
   void leave() noexcept SINERIG_NONBLOCKING;
@@ -63,6 +65,7 @@ class ModalDwell {
   ModalStore store_;
   std::unique_ptr<Deputy> solver_;
   ModalTask task_;
+  ModePrior modes_;
   std::uint64_t look_count_ = 0;                   // samples that it is to look at
   ModalVerdict answer_ = ModalVerdict::going_on;   // the solver's, of its last look
   ModalVerdict verdict_ = ModalVerdict::going_on;  // of the dwell

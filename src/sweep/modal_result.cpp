@@ -10,10 +10,6 @@ namespace sinerig {
 
 namespace {
 
-constexpr double db_per_relative = 20.0 / std::numbers::ln10;
-
-constexpr double degrees_per_radian = 180.0 / std::numbers::pi;
-
 // A residual of this part of the target, relative to the signal, is harmless.
 constexpr double harmless_part_of_target = 0.003;
 
@@ -48,11 +44,6 @@ std::complex<double> turn(double omega_rad_s, std::int64_t offset_ns) noexcept {
 }
 
 }  // namespace
-
-double ModalTask::relative_target() const noexcept {
-  return std::min(target_db > 0.0 ? target_db / db_per_relative : 1.0,
-                  target_deg > 0.0 ? target_deg / degrees_per_radian : 1.0);
-}
 
 // What the residual of the window may be: the noise, or a part of the target so small that no
 // transient of its size matters. Nothing real is linear to 120 dB.

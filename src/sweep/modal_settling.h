@@ -39,8 +39,7 @@ struct ModalTask {
   double target_db = 0.0;           // half widths wanted; 0: none
   double target_deg = 0.0;
 
-  // The smaller of them, relative to H; 1 where there is none.
-  double relative_target() const noexcept;
+  double relative_target() const noexcept { return smaller_target(target_db, target_deg); }
 };
 
 struct ModalResult {

@@ -7,6 +7,7 @@
 
 #include "sweep/motion_check.h"
 #include "sweep/multitone.h"
+#include "sweep/point_interval.h"
 #include "sweep/probe.h"
 
 namespace sinerig {
@@ -300,10 +301,7 @@ std::size_t SweepPlan::most_bins() const {
 }
 
 double Judgement::relative_target() const {
-  if (!has_target()) return 1e-3;
-  const double gain = target_db > 0.0 ? target_db * std::numbers::ln10 / 20.0 : 1.0;
-  const double phase = target_deg > 0.0 ? target_deg * std::numbers::pi / 180.0 : 1.0;
-  return std::min(gain, phase);
+  return has_target() ? smaller_target(target_db, target_deg) : 1e-3;
 }
 
 double amplitude_at(const SweepSettings& sweep, double frequency_hz) {

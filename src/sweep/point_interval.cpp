@@ -1,5 +1,6 @@
 #include "sweep/point_interval.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -28,6 +29,11 @@ Interval interval_of(std::complex<double> response, const PooledVariance& varian
   const double t = student_t_975(variance.dof) * std::sqrt(scale);
   return {.gain_db = db_per_relative * std::sqrt(t * t * along + left * left),
           .phase_deg = degrees_per_radian * std::sqrt(t * t * across + left * left)};
+}
+
+double smaller_target(double gain_db, double phase_deg) noexcept {
+  return std::min(gain_db > 0.0 ? gain_db / db_per_relative : 1.0,
+                  phase_deg > 0.0 ? phase_deg / degrees_per_radian : 1.0);
 }
 
 }  // namespace sinerig

@@ -19,4 +19,7 @@ struct Interval {
 Interval interval_of(std::complex<double> response, const PooledVariance& variance, double left,
                      double scale = 1.0) noexcept SINERIG_NONBLOCKING;
 
+// The smaller of two half widths that are wanted, relative to H; 0 is none, and 1 where both are.
+double smaller_target(double gain_db, double phase_deg) noexcept SINERIG_NONBLOCKING;
+
 }  // namespace sinerig

@@ -1,5 +1,6 @@
 #include "sweep/runner.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -30,12 +31,6 @@ RunnerSettings with_responses(RunnerSettings settings, std::size_t sensors) {
   for (std::size_t i = 0; i < sensors; ++i)
     settings.responses.push_back({.input = 0, .output = 1 + i});
   return settings;
-}
-
-std::vector<std::size_t> outputs_of(const Pairs& pairs) {
-  std::vector<std::size_t> outputs;
-  for (const Pair& pair : pairs) outputs.push_back(pair.output);
-  return outputs;
 }
 
 class ReleaseOnExit {
@@ -155,7 +150,8 @@ bool SweepRunner::step(RunControl& control) noexcept {
   if (probing) {
     probe(disturbed);
   } else if (reviewing) {
-    if (review_.ready()) hear_review();
+    review_ramp_left_ -= std::min(review_ramp_left_, ticks);
+    if (review_ramp_left_ == 0 && review_.ready()) hear_review();
   } else {
     run_.measure(tick.index, observations_, disturbed);
     if (run_.over()) conclude_dwell();

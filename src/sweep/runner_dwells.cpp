@@ -114,7 +114,7 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
     remeasuring_ = true;
     next_condemned();
   }
-  return dwell_ < dwells_.size();
+  return !closing();
 }
 
 void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {

@@ -79,7 +79,13 @@ void SweepRunner::review() noexcept {
   if (reviews_ == most_reviews || !run_.measurement().models()) return;
   ++reviews_;
   review_.ask(run_.measurement().modes());
-  if (review_.ready()) hear_review();
+  if (review_.ready()) {
+    hear_review();
+    return;
+  }
+  // Nothing moves while the answer is waited for.
+  excitation_.start(std::span<const double>{}, plan_.baseline.ramp_samples);
+  review_ramp_left_ = plan_.baseline.ramp_samples;
 }
 
 void SweepRunner::hear_review() noexcept {
