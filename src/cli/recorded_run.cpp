@@ -197,15 +197,6 @@ std::optional<KnownModes> earlier_modes(const config::Rig& rig) {
   return modes_of_file(rig.prior, outputs);
 }
 
-void refuse_other_dwells(const record::UnfinishedRun& earlier, const std::string& path,
-                         const SweepRunner& runner) {
-  SweepPlan reached{.rate_hz = earlier.stored.plan.rate_hz, .dwells = {}};
-  for (std::size_t i = 0; i < earlier.finished.known_dwells && i < runner.dwells().size(); ++i) {
-    reached.dwells.push_back(*runner.dwells()[i]);
-  }
-  record::refuse_other_plan(path, earlier.stored.plan, reached);
-}
-
 }  // namespace
 
 record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan) {
@@ -256,12 +247,9 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
                                            outbox, &configured);
     if (earlier != nullptr) {
       to_measure = runner->go_on(earlier->finished);
-      refuse_other_dwells(*earlier, writer->path(), *runner);
       control.dwell.store(earlier->finished.dwells);
       teller.resume(earlier->finished.points);
-      for (const Point& point : earlier->finished.points) {
-        if (view) view->run().take(point);
-      }
+      if (view) view->run().resume(earlier->finished);
     }
     if (to_measure) configured.arm();
     writer->begin_part(earlier != nullptr ? earlier->start : record::PartStart{});

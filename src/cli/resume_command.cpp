@@ -30,10 +30,6 @@ void tell_of_edits(const std::string& path, const std::string& text) {
   }
 }
 
-std::size_t dwells_left(const record::UnfinishedRun& run) {
-  return run.finished.known_dwells - run.finished.dwells;
-}
-
 }  // namespace
 
 int resume_command(const ResumeOptions& options, const std::vector<DriverKit>& drivers) {
@@ -44,7 +40,7 @@ int resume_command(const ResumeOptions& options, const std::vector<DriverKit>& d
     // Whose run still goes on is not to be judged by what it has written so far.
     const record::FileLock nobody_writes{options.file, record::file_in_use};
   }
-  const record::UnfinishedRun earlier = record::read_unfinished(options.file);
+  record::UnfinishedRun earlier = record::read_unfinished(options.file);
   if (earlier.done()) {
     spdlog::info("{}: its run is done, there is nothing to resume", options.file);
     return exit_done;
@@ -54,9 +50,10 @@ int resume_command(const ResumeOptions& options, const std::vector<DriverKit>& d
   tell_of_edits(rig, text);
   ConfiguredRig configured{config::RigFile::parse(text, rig), drivers};
   const SweepPlan plan = configured.rig().plan();
-  record::refuse_other_plan(options.file, earlier.stored.plan, plan);
+  earlier.finished.refined = record::candidates_refined(options.file, earlier.stored.plan, plan);
+  const std::size_t dwells = earlier.stored.plan.dwells.size();
   spdlog::info("{}: {} of {} dwells are finished, {} to go", options.file, earlier.finished.dwells,
-               earlier.finished.known_dwells, dwells_left(earlier));
+               dwells, dwells - earlier.finished.dwells);
   return record_run(
       configured, plan,
       {.sweep_file = options.file,

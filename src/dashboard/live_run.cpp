@@ -92,6 +92,12 @@ void LiveRun::begin_part() {
   }
 }
 
+void LiveRun::resume(const FinishedDwells& finished) {
+  const std::scoped_lock lock{mutex_};
+  for (const std::uint32_t candidate : finished.refined) where_.add(candidate);
+  entries_.insert(entries_.end(), finished.points.begin(), finished.points.end());
+}
+
 void LiveRun::take(const Record& record) {
   const std::scoped_lock lock{mutex_};
   if (where_.take(record)) begin_part();

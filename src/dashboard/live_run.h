@@ -16,6 +16,7 @@
 #include "dashboard/whereabouts.h"
 #include "record/sweep_reader.h"
 #include "report/remaining_time.h"
+#include "sweep/runner.h"
 
 namespace sinerig::dashboard {
 
@@ -41,6 +42,8 @@ class LiveRun {
   LiveRun(LiveSetup setup, const Lateness& lateness);
   ~LiveRun();
 
+  // Before the first record: what an earlier, interrupted part of the run has left.
+  void resume(const FinishedDwells& finished);
   // Recorder's thread: every record, in order.
   void take(const Record& record);
   // When all has been taken.

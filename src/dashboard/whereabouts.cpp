@@ -17,6 +17,11 @@ double Whereabouts::seconds() const {
   return tick_ > began_tick_ ? static_cast<double>(tick_ - began_tick_) / plan_.rate_hz : 0.0;
 }
 
+void Whereabouts::add(std::uint32_t candidate) {
+  if (candidate >= plan_.refinement.candidates.size()) return;
+  added_.push_back(plan_.refinement.candidates[candidate]);
+}
+
 bool Whereabouts::begin(Kind kind, std::uint64_t tick) {
   kind_ = kind;
   began_tick_ = tick_ = tick;
@@ -25,8 +30,7 @@ bool Whereabouts::begin(Kind kind, std::uint64_t tick) {
 
 bool Whereabouts::take_event(const Event& event) {
   if (event.kind == EventKind::refined) {
-    if (event.candidate < plan_.refinement.candidates.size())
-      added_.push_back(plan_.refinement.candidates[event.candidate]);
+    add(event.candidate);
   } else if (event.kind == EventKind::remeasured) {
     remeasured_ = event.dwell;
   } else if (event.kind == EventKind::retried) {

@@ -25,13 +25,15 @@ class Whereabouts {
   // `plan` must outlive it.
   Whereabouts(const SweepPlan& plan, bool preflight) : plan_{plan}, preflight_{preflight} {}
 
+  // Of the plan's refinement: was added before the run was resumed.
+  void add(std::uint32_t candidate);
   // Every record, in order. True where something begins: what was seen before belongs to another
   // part.
   bool take(const Record& record);
 
   Kind kind() const { return kind_; }
   std::uint32_t dwell() const { return dwell_; }  // index; from the plan's size on those added
-  // Null where none is under way, and for one that was added before the run was resumed.
+  // Null where none is under way.
   const Dwell* under_way() const;
   double amplitude() const { return amplitude_; }  // asked for, of its first tone; 0: not known
   std::uint32_t retries() const { return retries_; }

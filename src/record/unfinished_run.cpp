@@ -188,21 +188,32 @@ UnfinishedRun read_unfinished(const std::string& path) {
                   .points = points_of(run.stored, dwells),
                   .lessons = lessons_of(database),
                   .condemned = {condemned.begin(), condemned.lower_bound(dwells)},
-                  .known_dwells = static_cast<std::uint32_t>(run.stored.plan.dwells.size())};
+                  .refined = {}};
   run.start = next_start(database, dwells);
   return run;
 }
 
-void refuse_other_plan(const std::string& path, const SweepPlan& stored, const SweepPlan& plan) {
-  const std::size_t dwells = std::min(plan.dwells.size(), stored.dwells.size());
-  for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
-    if (plan.rate_hz == stored.rate_hz && i < dwells && same(plan.dwells[i], stored.dwells[i])) {
-      continue;
-    }
-    throw SweepFileError(path + ": this sinerig plans dwell " + std::to_string(i + 1) +
+std::vector<std::uint32_t> candidates_refined(const std::string& path, const SweepPlan& stored,
+                                              const SweepPlan& plan) {
+  const auto refuse = [&](std::size_t dwell) {
+    throw SweepFileError(path + ": this sinerig plans dwell " + std::to_string(dwell + 1) +
                          " of its rig file differently than the one that began the run; resume it "
                          "with that version");
+  };
+  for (std::size_t i = 0; i < plan.dwells.size(); ++i) {
+    const bool there = plan.rate_hz == stored.rate_hz && i < stored.dwells.size();
+    if (!there || !same(plan.dwells[i], stored.dwells[i])) refuse(i);
   }
+  std::vector<std::uint32_t> added;
+  const std::vector<Dwell>& candidates = plan.refinement.candidates;
+  for (std::size_t i = plan.dwells.size(); i < stored.dwells.size(); ++i) {
+    const auto found = std::find_if(candidates.begin(), candidates.end(), [&](const Dwell& each) {
+      return same(each, stored.dwells[i]);
+    });
+    if (found == candidates.end() || added.size() == plan.refinement.most_points) refuse(i);
+    added.push_back(static_cast<std::uint32_t>(found - candidates.begin()));
+  }
+  return added;
 }
 
 bool can_be_resumed(const std::string& path) noexcept {

@@ -1,7 +1,9 @@
 // A sweep file whose run did not end: how far it came, and what is needed to go on.
 #pragma once
 
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "record/sweep_reader.h"
 #include "record/sweep_writer.h"
@@ -23,9 +25,10 @@ struct UnfinishedRun {
 // no sweep file, and for one that this version would have laid out differently.
 UnfinishedRun read_unfinished(const std::string& path);
 
-// Throws SweepFileError naming the first dwell that differs in the stored plan. Dwells that
-// refinement added are left out.
-void refuse_other_plan(const std::string& path, const SweepPlan& stored, const SweepPlan& plan);
+// The dwells that refinement has added to the stored plan, as candidates of the plan. Throws
+// SweepFileError naming the first stored dwell that the plan has not.
+std::vector<std::uint32_t> candidates_refined(const std::string& path, const SweepPlan& stored,
+                                              const SweepPlan& plan);
 
 // Whether `sinerig resume` would go on with it; false for whatever cannot be read.
 bool can_be_resumed(const std::string& path) noexcept;

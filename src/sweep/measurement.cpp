@@ -143,9 +143,19 @@ void Measurement::add(std::span<const Phasor> phasors,
   ++in_block_;
   // Part k of a block ends at the sample nearest below (k + 1) / parts of it.
   if (in_block_ * dwell_->parts >= (part_ + 1) * dwell_->block_samples) end_part();
-  if (!modal_ || done_ || !modal_->live()) return;
-  modal_->add(phasors[0], observations);
-  if (!modal_->accepted()) return;
+  if (!done_ && modal_ && modal_->live()) {
+    modal_->add(phasors[0], observations);
+    if (modal_->accepted()) end_modelled();
+  }
+  // What its model has to say may take some ticks more.
+  if (at_limit_ && !done_ && (!modal_ || modal_->concluded())) {
+    conclude();
+    done_ = true;
+  }
+}
+
+// The model has ended the dwell, but for one that is drawn to be measured both ways.
+void Measurement::end_modelled() noexcept {
   take_modal();
   if (!drawn()) {
     done_ = true;
@@ -220,11 +230,7 @@ void Measurement::end_part() noexcept {
     }
   }
   if (kept) judge();
-  if (samples_ + dwell_->settle_samples >= dwell_->max_samples && !done_) {
-    at_limit_ = true;
-    conclude();
-    done_ = true;
-  }
+  if (samples_ + dwell_->settle_samples >= dwell_->max_samples && !done_) at_limit_ = true;
 }
 
 void Measurement::conclude() noexcept {

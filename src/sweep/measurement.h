@@ -115,6 +115,7 @@ class Measurement {
   }
   void start_modal() noexcept;
   void take_modal() noexcept;
+  void end_modelled() noexcept;
   bool drawn() const noexcept;
   SettledBy settled_by() const noexcept;
   void hold_against_model() noexcept;

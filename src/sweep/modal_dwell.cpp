@@ -18,7 +18,14 @@ ModalDwell::ModalDwell(std::size_t channels, std::vector<std::size_t> outputs, d
       solver_{make_solver(Deputy::Where::at_once)} {}
 
 std::unique_ptr<Deputy> ModalDwell::make_solver(Deputy::Where where) {
-  return std::make_unique<Deputy>([this] { answer_ = settling_.look(store_, look_count_); }, where);
+  const auto solve = [this] {
+    if (job_ == Job::look) {
+      answer_ = settling_.look(store_, look_count_);
+    } else {
+      settling_.conclude(store_);
+    }
+  };
+  return std::make_unique<Deputy>(solve, where);
 }
 
 void ModalDwell::solve_elsewhere() {
@@ -28,6 +35,7 @@ void ModalDwell::solve_elsewhere() {
 void ModalDwell::leave() noexcept {
   live_ = false;
   looking_ = false;
+  concluding_ = false;
   verdict_ = ModalVerdict::going_on;
 }
 
@@ -49,7 +57,7 @@ void ModalDwell::begin() noexcept {
 }
 
 void ModalDwell::add(Phasor tone, std::span<const Observation> observations) noexcept {
-  if (!live_) return;
+  if (!live_ || concluding_) return;
   if (waiting_ && solver_->idle()) begin();
   if (waiting_) return;
   if (blind_left_ > 0) {
@@ -62,6 +70,7 @@ void ModalDwell::add(Phasor tone, std::span<const Observation> observations) noe
   if (store_.count() < settling_.next_look() && !store_.full()) return;
   look_count_ = store_.count();
   looking_ = true;
+  job_ = Job::look;
   solver_->ask();
   if (solver_->idle()) hear();
 }
@@ -73,10 +82,20 @@ void ModalDwell::hear() noexcept {
   live_ = verdict_ == ModalVerdict::going_on;
 }
 
+bool ModalDwell::concluded() noexcept {
+  if (!live_ || waiting_) return true;
+  if (!solver_->idle()) return false;
+  if (looking_) hear();
+  if (live_ && !concluding_) {
+    concluding_ = true;
+    job_ = Job::conclude;
+    solver_->ask();
+  }
+  return solver_->idle();
+}
+
 bool ModalDwell::conclude() noexcept {
-  if (!live_ || waiting_ || !solver_->idle()) return false;
-  settling_.conclude(store_);
-  return settling_.result(0).known;
+  return concluded() && live_ && !waiting_ && settling_.result(0).known;
 }
 
 }  // namespace sinerig

@@ -52,8 +52,10 @@ class ModalDwell {
   bool refuted() const noexcept { return abandoned() && settling_.doubt() == ModalDoubt::residual; }
   const ModalResult& result(std::size_t output) const noexcept { return settling_.result(output); }
 
-  // The dwell ends without a verdict: the results are the best that is known. False where there is
-  // nothing.
+  // The dwell ends without a verdict: what is known best is asked for with the first call; true once
+  // it is there, or nothing will come.
+  bool concluded() noexcept SINERIG_NONBLOCKING;
+  // … is in the results. False where nothing is.
   bool conclude() noexcept SINERIG_NONBLOCKING;
 
  private:
@@ -61,8 +63,11 @@ class ModalDwell {
   void begin() noexcept;
   void hear() noexcept;
 
+  enum class Job : std::uint8_t { look, conclude };
+
   ModalSettling settling_;
   ModalStore store_;
+  Job job_ = Job::look;  // the solver's next
   std::unique_ptr<Deputy> solver_;
   ModalTask task_;
   ModePrior modes_;
@@ -70,7 +75,8 @@ class ModalDwell {
   ModalVerdict answer_ = ModalVerdict::going_on;   // the solver's, of its last look
   ModalVerdict verdict_ = ModalVerdict::going_on;  // of the dwell
   bool looking_ = false;                           // the solver has been asked and not yet heard
-  bool waiting_ = false;  // it is busy with what has gone; this dwell begins when it is done
+  bool concluding_ = false;  // … for the best that is known
+  bool waiting_ = false;     // it is busy with what has gone; this dwell begins when it is done
   bool live_ = false;
   std::uint64_t blind_left_ = 0;
 };

@@ -38,6 +38,9 @@ class Refiner {
   // candidates of the gaps where it is not are used up.
   std::optional<std::size_t> next() noexcept SINERIG_NONBLOCKING;
 
+  // The candidate has been measured already.
+  void use(std::size_t candidate) noexcept { used_[candidate] = true; }
+
   // Largest disagreement over all gaps, dB.
   double worst_db() const noexcept SINERIG_NONBLOCKING;
 

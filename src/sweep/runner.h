@@ -40,7 +40,7 @@ struct FinishedDwells {
   std::vector<Point> points;    // theirs, of all tones and responses
   std::vector<Lesson> lessons;  // in the order in which they were taught
   std::vector<std::uint32_t> condemned;  // of them: to be measured again by detection
-  std::uint32_t known_dwells = 0;  // dwells that are on record, those added by refinement included
+  std::vector<std::uint32_t> refined;  // candidates of the plan that refinement has added, in order
 };
 
 class SweepRunner {
@@ -88,7 +88,7 @@ class SweepRunner {
   void finish_dwell() noexcept;
   void next_dwell() noexcept;
   void account_usage() noexcept SINERIG_NONBLOCKING;
-  void refine(bool tell = true) noexcept;
+  void refine() noexcept;
   void note_sensor(std::size_t sensor, const Sample& sample, std::uint64_t tick) noexcept;
   void announce(const Event& event) noexcept { sink_.put(event); }
 

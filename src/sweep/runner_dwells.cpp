@@ -84,6 +84,10 @@ void SweepRunner::tell_trip(EventKind kind) noexcept {
 bool SweepRunner::go_on(const FinishedDwells& finished) {
   auto point = finished.points.begin();
   auto lesson = finished.lessons.begin();
+  for (const std::uint32_t candidate : finished.refined) {
+    refiner_.use(candidate);
+    dwells_.push_back(&plan_.refinement.candidates.at(candidate));
+  }
   while (dwell_ < finished.dwells && dwell_ < dwells_.size()) {
     const Dwell& dwell = *dwells_[dwell_];
     for (; lesson != finished.lessons.end() && lesson->dwell <= dwell_; ++lesson) {
@@ -102,8 +106,8 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
     }
     ++dwell_;
     ++outcome_.dwells_done;
-    if (dwell_ == dwells_.size()) refine(dwell_ >= finished.known_dwells);
   }
+  if (dwell_ == dwells_.size()) refine();
   for (; lesson != finished.lessons.end() && dwell_ < dwells_.size(); ++lesson) {
     run_.recall(*lesson, *dwells_[dwell_]);
   }
@@ -191,13 +195,12 @@ void SweepRunner::next_dwell() noexcept {
 }
 
 // One more dwell where the response between two points is not known.
-void SweepRunner::refine(bool tell) noexcept {
+void SweepRunner::refine() noexcept {
   if (dwells_.size() == plan_.dwells.size() + plan_.refinement.most_points) return;
   const double disagreement_db = refiner_.worst_db();
   const std::optional<std::size_t> candidate = refiner_.next();
   if (!candidate) return;
   dwells_.push_back(&plan_.refinement.candidates[*candidate]);  // within what was reserved
-  if (!tell) return;
   announce({.kind = EventKind::refined,
             .dwell = dwell_,
             .tick = last_tick_,

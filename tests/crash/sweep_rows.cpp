@@ -65,7 +65,7 @@ SweepRows rows_of(const std::string& path, std::uint32_t before) {
   const record::UnfinishedRun run = record::read_unfinished(copy.path());
   found.outcome = run.stored.fact("outcome");
   found.finished = run.finished.dwells;
-  found.dwells = run.finished.known_dwells;
+  found.dwells = static_cast<std::uint32_t>(run.stored.plan.dwells.size());
   found.parts = static_cast<std::uint32_t>(run.stored.parts.size());
   Statement stopped{database, "SELECT count(*) FROM point WHERE status = 'stopped'"};
   if (stopped.step()) found.stopped = static_cast<std::uint32_t>(stopped.integer(0));

@@ -98,10 +98,16 @@ TEST_F(WhereaboutsTest, NamesWhatRefinementAddsAndWhatIsMeasuredAgain) {
   where.take(event(EventKind::dwell_began, 1));
   EXPECT_EQ(where.kind(), Kind::remeasured);
   EXPECT_EQ(where.dwell(), 1U);
-  // Added before the run was resumed: not known any more.
-  where.take(end(1));
-  where.take(event(EventKind::dwell_began, planned_ + 1));
-  EXPECT_EQ(where.under_way(), nullptr);
+}
+
+TEST_F(WhereaboutsTest, KnowsWhatWasAddedBeforeTheRunWasResumed) {
+  Whereabouts where{plan_, false};
+  where.add(1);
+  EXPECT_TRUE(where.take(event(EventKind::dwell_began, planned_)));
+  EXPECT_EQ(where.kind(), Kind::refined);
+  ASSERT_NE(where.under_way(), nullptr);
+  EXPECT_EQ(where.under_way()->frequency_hz(plan_.rate_hz),
+            plan_.refinement.candidates[1].frequency_hz(plan_.rate_hz));
 }
 
 }  // namespace

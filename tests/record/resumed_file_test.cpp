@@ -84,7 +84,7 @@ TEST_F(ResumedFile, GoesOnWithTheDwellThatWasStopped) {
   const UnfinishedRun run = read_unfinished(path());
   EXPECT_FALSE(run.done());
   EXPECT_EQ(run.finished.dwells, 2U);
-  EXPECT_EQ(run.finished.known_dwells, 4U);
+  EXPECT_EQ(run.stored.plan.dwells.size(), 4U);
   ASSERT_EQ(run.finished.points.size(), 2U);
   EXPECT_EQ(run.finished.points[1].response, a_point(1).response);
   EXPECT_EQ(run.finished.lessons.size(), 3U);
@@ -211,11 +211,11 @@ TEST_F(ResumedFile, IsNamedWhenANewRunWouldTakeItsPlace) {
 TEST_F(ResumedFile, OfAnotherPlanIsRefused) {
   first_part();
   const SweepPlan stored = read_unfinished(path()).stored.plan;
-  EXPECT_NO_THROW(refuse_other_plan(path(), stored, an_info().plan));
+  EXPECT_TRUE(candidates_refined(path(), stored, an_info().plan).empty());
   SweepPlan other = an_info().plan;
   other.dwells[1].tones[0].amplitude *= 1.0 + 1e-15;
   try {
-    refuse_other_plan(path(), stored, other);
+    candidates_refined(path(), stored, other);
     FAIL();
   } catch (const SweepFileError& error) {
     EXPECT_EQ(error.what(), path() +
@@ -224,7 +224,15 @@ TEST_F(ResumedFile, OfAnotherPlanIsRefused) {
   }
   other = an_info().plan;
   other.dwells.push_back(other.dwells.back());
-  EXPECT_THROW(refuse_other_plan(path(), stored, other), SweepFileError);
+  EXPECT_THROW(candidates_refined(path(), stored, other), SweepFileError);
+  // What has been added is a candidate of the plan, or another version's.
+  other = an_info().plan;
+  const Dwell last = other.dwells.back();
+  other.dwells.pop_back();
+  EXPECT_THROW(candidates_refined(path(), stored, other), SweepFileError);
+  other.refinement.candidates = {other.dwells.front(), last};
+  other.refinement.most_points = 1;
+  EXPECT_EQ(candidates_refined(path(), stored, other), std::vector<std::uint32_t>{1});
 }
 
 TEST_F(ResumedFile, OfAnotherLayoutIsReadButNotResumed) {

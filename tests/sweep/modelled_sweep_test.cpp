@@ -106,7 +106,7 @@ TEST(ModelledSweep, GoesOnWithWhatWasCondemned) {
                           .points = whole.sink.points,
                           .lessons = {},
                           .condemned = {3, 7},
-                          .known_dwells = 16};
+                          .refined = {}};
   VirtualClock clock{TickGrid{rate_hz}};
   const sim::SimulatedRigSettings settings = damped_axis();
   sim::SimulatedRig rig{settings, clock};

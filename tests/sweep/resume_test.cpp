@@ -52,10 +52,21 @@ Measured run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells&
   return run;
 }
 
-// What a file would hold of the first dwells of a run.
-FinishedDwells first_of(const Measured& run, std::uint32_t dwells, std::uint32_t known) {
+std::vector<std::uint32_t> refined(const Measured& run) {
+  std::vector<std::uint32_t> candidates;
+  for (const Event& event : run.sink.events) {
+    if (event.kind == EventKind::refined) candidates.push_back(event.candidate);
+  }
+  return candidates;
+}
+
+// What a file would hold of the first dwells of a run, the first `added` of its refined dwells
+// among what is known.
+FinishedDwells first_of(const Measured& run, std::uint32_t dwells, std::size_t added = 0) {
+  std::vector<std::uint32_t> candidates = refined(run);
+  candidates.resize(added);
   FinishedDwells finished{
-      .dwells = dwells, .points = {}, .lessons = {}, .condemned = {}, .known_dwells = known};
+      .dwells = dwells, .points = {}, .lessons = {}, .condemned = {}, .refined = candidates};
   for (const Point& point : run.sink.points) {
     if (point.dwell < dwells) finished.points.push_back(point);
   }
@@ -63,14 +74,6 @@ FinishedDwells first_of(const Measured& run, std::uint32_t dwells, std::uint32_t
     if (lesson.dwell < dwells) finished.lessons.push_back(lesson);
   }
   return finished;
-}
-
-std::vector<std::uint32_t> refined(const Measured& run) {
-  std::vector<std::uint32_t> candidates;
-  for (const Event& event : run.sink.events) {
-    if (event.kind == EventKind::refined) candidates.push_back(event.candidate);
-  }
-  return candidates;
 }
 
 class GoingOn : public testing::TestWithParam<std::uint32_t> {};
@@ -81,7 +84,8 @@ TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
   ASSERT_FALSE(whole.outcome.trip.tripped());
   ASSERT_GT(whole.dwells, plan.dwells.size()) << "nothing was refined";
   const std::uint32_t kept = GetParam();
-  const Measured rest = run_from(plan, 0.0, first_of(whole, kept, kept));
+  const std::size_t added = kept > plan.dwells.size() ? kept - plan.dwells.size() : 0;
+  const Measured rest = run_from(plan, 0.0, first_of(whole, kept, added));
   EXPECT_EQ(rest.outcome.dwells_done, whole.outcome.dwells_done);
   ASSERT_EQ(rest.sink.points.size(), whole.sink.points.size() - kept);
   for (std::size_t i = 0; i < rest.sink.points.size(); ++i) {
@@ -102,7 +106,7 @@ TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   const Measured whole = run_from(plan, 0.01, {});
   ASSERT_GE(whole.sink.lessons.size(), 12U);
   // The amplitude of the first attempt follows from the recalled points alone, to the last bit.
-  const Measured rest = run_from(plan, 0.01, first_of(whole, 8, 8));
+  const Measured rest = run_from(plan, 0.01, first_of(whole, 8));
   const auto amplitude_of = [](const Measured& run) {
     for (const Block& block : run.sink.blocks) {
       if (block.dwell == 8 && block.channel == applied_channel)
@@ -113,7 +117,7 @@ TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   EXPECT_NEAR(amplitude_of(rest), amplitude_of(whole), 1e-12);
   EXPECT_NE(amplitude_of(rest), 0.0);
   // Without the lessons the colour of the noise would have to be learnt anew.
-  FinishedDwells forgetful = first_of(whole, 8, 8);
+  FinishedDwells forgetful = first_of(whole, 8);
   forgetful.lessons.clear();
   const Measured again = run_from(plan, 0.01, forgetful);
   EXPECT_GT(rest.sink.points.front().dof, again.sink.points.front().dof);
@@ -124,18 +128,41 @@ TEST(RestOfASweep, ChoosesTheSameRefinementsAndTellsOnlyOfNewOnes) {
   const Measured whole = run_from(plan, 0.0, {});
   const std::vector<std::uint32_t> all = refined(whole);
   ASSERT_GE(all.size(), 2U);
-  // The first pass is done; the first added dwell may or may not have reached the file.
+  // The first pass is done; the first added dwell may or may not have been measured.
   const auto first_pass = static_cast<std::uint32_t>(plan.dwells.size());
-  EXPECT_EQ(refined(run_from(plan, 0.0, first_of(whole, first_pass, first_pass))).front(), all[0]);
-  EXPECT_EQ(refined(run_from(plan, 0.0, first_of(whole, first_pass, first_pass + 1))).front(),
+  EXPECT_EQ(refined(run_from(plan, 0.0, first_of(whole, first_pass))).front(), all[0]);
+  EXPECT_EQ(refined(run_from(plan, 0.0, first_of(whole, first_pass, 1))).front(), all[1]);
+  EXPECT_EQ(refined(run_from(plan, 0.0, first_of(whole, first_pass + 1, 1))).front(),
             all[1]);
+}
+
+// A point that has been measured again since may call for another place: those chosen stay.
+TEST(RestOfASweep, KeepsTheRefinementsThatWereChosen) {
+  const SweepPlan plan = levelled_plan();
+  const Measured whole = run_from(plan, 0.0, {});
+  const std::size_t added = whole.dwells - plan.dwells.size();
+  ASSERT_EQ(added, 4U);
+  FinishedDwells finished = first_of(whole, static_cast<std::uint32_t>(whole.dwells), added);
+  for (Point& point : finished.points) {
+    if (point.dwell % 2 == 0) point.response *= std::complex<double>{0.6, 0.3};
+  }
+  finished.dwells -= 2;
+  const Measured rest = run_from(plan, 0.0, finished);
+  EXPECT_TRUE(refined(rest).empty());
+  ASSERT_EQ(rest.sink.points.size(), 2U);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Point& point = whole.sink.points[whole.sink.points.size() - 2 + i];
+    EXPECT_EQ(rest.sink.points[i].dwell, point.dwell);
+    EXPECT_EQ(rest.sink.points[i].frequency_hz, point.frequency_hz);
+  }
 }
 
 TEST(RestOfASweep, KnowsWhenNothingIsLeft) {
   const SweepPlan plan = levelled_plan();
   const Measured whole = run_from(plan, 0.0, {});
   const auto all = static_cast<std::uint32_t>(whole.dwells);
-  const Measured rest = run_from(plan, 0.0, first_of(whole, all, all));
+  const Measured rest =
+      run_from(plan, 0.0, first_of(whole, all, whole.dwells - plan.dwells.size()));
   EXPECT_FALSE(rest.to_measure);
   EXPECT_TRUE(rest.sink.events.empty());
 }
