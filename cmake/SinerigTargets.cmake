@@ -21,6 +21,10 @@ function(sinerig_options target)
     target_compile_options(${target} PUBLIC
       -fsanitize=${SINERIG_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer -O1)
     target_link_options(${target} PUBLIC -fsanitize=${SINERIG_SANITIZE})
+    # What a sanitizer adds hides from g++ what has been initialised (<regex> of libstdc++ 12).
+    if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+      target_compile_options(${target} PRIVATE -Wno-maybe-uninitialized)
+    endif()
   endif()
 endfunction()
 

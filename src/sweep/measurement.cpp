@@ -235,7 +235,7 @@ void Measurement::end_part() noexcept {
 
 void Measurement::conclude() noexcept {
   if (dwell_ == nullptr || done_) return;
-  if (modal_ && modal_->conclude()) {
+  if (modal_ && !checking_ && modal_->conclude()) {
     take_modal();
     return;
   }

@@ -19,11 +19,8 @@ ModalDwell::ModalDwell(std::size_t channels, std::vector<std::size_t> outputs, d
 
 std::unique_ptr<Deputy> ModalDwell::make_solver(Deputy::Where where) {
   const auto solve = [this] {
-    if (job_ == Job::look) {
-      answer_ = settling_.look(store_, look_count_);
-    } else {
-      settling_.conclude(store_);
-    }
+    answer_ = settling_.look(store_, look_count_);
+    if (last_look_ && answer_ == ModalVerdict::going_on) settling_.conclude(store_);
   };
   return std::make_unique<Deputy>(solve, where);
 }
@@ -68,9 +65,13 @@ void ModalDwell::add(Phasor tone, std::span<const Observation> observations) noe
   if (looking_ && solver_->idle()) hear();
   if (looking_ || !live_) return;
   if (store_.count() < settling_.next_look() && !store_.full()) return;
+  look();
+}
+
+void ModalDwell::look() noexcept {
   look_count_ = store_.count();
+  last_look_ = concluding_;
   looking_ = true;
-  job_ = Job::look;
   solver_->ask();
   if (solver_->idle()) hear();
 }
@@ -84,18 +85,17 @@ void ModalDwell::hear() noexcept {
 
 bool ModalDwell::concluded() noexcept {
   if (!live_ || waiting_) return true;
-  if (!solver_->idle()) return false;
+  if (looking_ && !solver_->idle()) return false;
   if (looking_) hear();
   if (live_ && !concluding_) {
     concluding_ = true;
-    job_ = Job::conclude;
-    solver_->ask();
+    look();
   }
-  return solver_->idle();
+  return !looking_;
 }
 
 bool ModalDwell::conclude() noexcept {
-  return concluded() && live_ && !waiting_ && settling_.result(0).known;
+  return concluded() && !waiting_ && (live_ || accepted()) && settling_.result(0).known;
 }
 
 }  // namespace sinerig

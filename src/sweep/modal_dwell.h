@@ -52,8 +52,8 @@ class ModalDwell {
   bool refuted() const noexcept { return abandoned() && settling_.doubt() == ModalDoubt::residual; }
   const ModalResult& result(std::size_t output) const noexcept { return settling_.result(output); }
 
-  // The dwell ends without a verdict: what is known best is asked for with the first call; true once
-  // it is there, or nothing will come.
+  // The dwell ends without a verdict: what is known best is asked for with the first call; true
+  // once it is there, or nothing will come.
   bool concluded() noexcept SINERIG_NONBLOCKING;
   // … is in the results. False where nothing is.
   bool conclude() noexcept SINERIG_NONBLOCKING;
@@ -61,22 +61,21 @@ class ModalDwell {
  private:
   std::unique_ptr<Deputy> make_solver(Deputy::Where where);
   void begin() noexcept;
+  void look() noexcept;
   void hear() noexcept;
-
-  enum class Job : std::uint8_t { look, conclude };
 
   ModalSettling settling_;
   ModalStore store_;
-  Job job_ = Job::look;  // the solver's next
   std::unique_ptr<Deputy> solver_;
   ModalTask task_;
   ModePrior modes_;
   std::uint64_t look_count_ = 0;                   // samples that it is to look at
+  bool last_look_ = false;                         // … to say the best that is known as well
   ModalVerdict answer_ = ModalVerdict::going_on;   // the solver's, of its last look
   ModalVerdict verdict_ = ModalVerdict::going_on;  // of the dwell
   bool looking_ = false;                           // the solver has been asked and not yet heard
-  bool concluding_ = false;  // … for the best that is known
-  bool waiting_ = false;     // it is busy with what has gone; this dwell begins when it is done
+  bool concluding_ = false;                        // … for the last time
+  bool waiting_ = false;  // it is busy with what has gone; this dwell begins when it is done
   bool live_ = false;
   std::uint64_t blind_left_ = 0;
 };

@@ -1,5 +1,6 @@
 // The loop takes no memory between its first tick and the release of the actuator. That the count
 // works is tested too: allocations planted in a sensor are found.
+#include <array>
 #include <cstdlib>
 #include <memory>
 #include <optional>
@@ -72,7 +73,8 @@ struct LoopCase {
   const char* name;
   void (*arrange)(sim::SimulatedRigSettings&, GuardSettings&);
   bool gaps = false;
-  bool modelled = false;
+  std::optional<SettledBy> modelled = std::nullopt;  // and how some dwells end
+  double check_fraction = 0.0;
   void (*plant)() = nullptr;
 };
 
@@ -86,7 +88,33 @@ KnownModes told_modes() {
   return known;
 }
 
-std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
+using PointsBy = std::array<int, static_cast<std::size_t>(SettledBy::both) + 1>;
+
+// How the points were settled.
+class CountingSink final : public RecordSink {
+ public:
+  explicit CountingSink(RecordSink& inner) : inner_{inner} {}
+  void put(const Record& record) noexcept override {
+    const auto* point = std::get_if<Point>(&record);
+    if (point != nullptr) ++points_[static_cast<std::size_t>(point->settled_by)];
+    inner_.put(record);
+  }
+  void put_sample(const TickSamples& samples) noexcept override { inner_.put_sample(samples); }
+  bool flush() noexcept override { return inner_.flush(); }
+  const PointsBy& points() const { return points_; }
+
+ private:
+  RecordSink& inner_;
+  PointsBy points_{};
+};
+
+struct LoopRun {
+  std::uint64_t allocations = 0;
+  PointsBy points{};
+  int by(SettledBy settled) const { return points[static_cast<std::size_t>(settled)]; }
+};
+
+LoopRun run_of(const LoopCase& loop) {
   SweepSettings sweep;
   sweep.start_hz = 2.0;
   sweep.stop_hz = 400.0;
@@ -97,7 +125,8 @@ std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
   sweep.integrate_max = {.cycles = 4.0, .seconds = 1.0};
   if (loop.modelled) {
     sweep.settling = Settling::model;
-    sweep.check_fraction = 0.3;
+    sweep.check_fraction = loop.check_fraction;
+    sweep.settle_max = {.cycles = 4.0, .seconds = 10.0};
   }
   const SweepPlan plan = plan_sweep(sweep, {}, 1000.0);
 
@@ -122,65 +151,77 @@ std::uint64_t allocations_in_the_loop(const LoopCase& loop) {
   Sensor* const sensors[] = {&first, &rig.sensor(1)};
   Guard guard{guard_settings, clock.grid().period_s()};
   Outbox outbox{1 << 12, 1 << 12, Outbox::WhenFull::keep};  // never emptied: it runs full as well
+  CountingSink sink{outbox};
   RunnerSettings settings{.responses = {}, .readbacks = {}, .record_samples = true};
   if (loop.modelled) settings.modes = told_modes();
-  SweepRunner runner{plan, settings, clock, actuator, sensors, guard, outbox};
+  SweepRunner runner{plan, settings, clock, actuator, sensors, guard, sink};
   RunControl control;
   runner.run(control);
-  return actuator.allocations.value();
+  return {.allocations = actuator.allocations.value(), .points = sink.points()};
 }
 
 class TheLoop : public testing::TestWithParam<LoopCase> {};
 
 TEST_P(TheLoop, AllocatesNothing) {
-  EXPECT_EQ(allocations_in_the_loop(GetParam()), 0U);
+  const LoopRun run = run_of(GetParam());
+  EXPECT_EQ(run.allocations, 0U);
+  if (!GetParam().modelled) return;
+  EXPECT_GT(run.by(*GetParam().modelled), 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     Rigs, TheLoop,
-    testing::Values(LoopCase{.name = "Clean",
-                             .arrange =
-                                 [](auto&, auto&) {
-                                 }},
-                    LoopCase{.name = "WithEveryImperfection",
-                             .arrange =
-                                 [](auto& rig, auto&) {
-                                   rig.friction = {.coulomb = 0.01, .breakaway = 0.02};
-                                   rig.actuator = {.min = -0.4,
-                                                   .max = 0.4,
-                                                   .quantum = 1e-3,
-                                                   .slew_per_s = 300.0,
-                                                   .dropout_fraction = 0.0005};
-                                   rig.sensors[0].imperfections = {.delay_s = 0.0023,
-                                                                   .jitter_s = 0.0004,
-                                                                   .noise_rms = 1e-4,
-                                                                   .pink_noise_rms = 1e-4,
-                                                                   .bias = 0.1,
-                                                                   .drift_per_s = 1e-3,
-                                                                   .backlash = 1e-4,
-                                                                   .quantum = 1e-5,
-                                                                   .min = -2.0,
-                                                                   .max = 2.0,
-                                                                   .lost_fraction = 0.001,
-                                                                   .late_fraction = 0.001,
-                                                                   .stuck_at_s = 20.0};
-                                 }},
-                    LoopCase{.name = "WithGaps", .arrange = [](auto&, auto&) {}, .gaps = true},
-                    LoopCase{.name = "WithModelledTransients",
-                             .arrange = [](auto&, auto&) {},
-                             .modelled = true},
-                    LoopCase{.name = "StoppedByALimit",
-                             .arrange =
-                                 [](auto&, auto& guard) {
-                                   guard.channels[1].max = 0.5;
-                                   guard.stop_ramp_ticks = 20;
-                                 }}),
+    testing::Values(
+        LoopCase{.name = "Clean",
+                 .arrange =
+                     [](auto&, auto&) {
+                     }},
+        LoopCase{.name = "WithEveryImperfection",
+                 .arrange =
+                     [](auto& rig, auto&) {
+                       rig.friction = {.coulomb = 0.01, .breakaway = 0.02};
+                       rig.actuator = {.min = -0.4,
+                                       .max = 0.4,
+                                       .quantum = 1e-3,
+                                       .slew_per_s = 300.0,
+                                       .dropout_fraction = 0.0005};
+                       rig.sensors[0].imperfections = {.delay_s = 0.0023,
+                                                       .jitter_s = 0.0004,
+                                                       .noise_rms = 1e-4,
+                                                       .pink_noise_rms = 1e-4,
+                                                       .bias = 0.1,
+                                                       .drift_per_s = 1e-3,
+                                                       .backlash = 1e-4,
+                                                       .quantum = 1e-5,
+                                                       .min = -2.0,
+                                                       .max = 2.0,
+                                                       .lost_fraction = 0.001,
+                                                       .late_fraction = 0.001,
+                                                       .stuck_at_s = 20.0};
+                     }},
+        LoopCase{.name = "WithGaps", .arrange = [](auto&, auto&) {}, .gaps = true},
+        LoopCase{.name = "WithModelledTransients",
+                 .arrange = [](auto&, auto&) {},
+                 .modelled = SettledBy::model},
+        LoopCase{.name = "WithModelledTransientsThatAreChecked",
+                 .arrange = [](auto&, auto&) {},
+                 .modelled = SettledBy::both,
+                 .check_fraction = 1.0},
+        LoopCase{.name = "WithModesThatExplainNothing",
+                 .arrange = [](auto& rig, auto&) { rig.sensors[0].imperfections.noise_rms = 1e-3; },
+                 .modelled = SettledBy::fallback},
+        LoopCase{.name = "StoppedByALimit",
+                 .arrange =
+                     [](auto&, auto& guard) {
+                       guard.channels[1].max = 0.5;
+                       guard.stop_ramp_ticks = 20;
+                     }}),
     [](const auto& instance) { return std::string{instance.param.name}; });
 
 class ThePlantedAllocation : public testing::TestWithParam<LoopCase> {};
 
 TEST_P(ThePlantedAllocation, IsFound) {
-  EXPECT_EQ(allocations_in_the_loop(GetParam()), 1U);
+  EXPECT_EQ(run_of(GetParam()).allocations, 1U);
 }
 
 INSTANTIATE_TEST_SUITE_P(Calls, ThePlantedAllocation,

@@ -3,11 +3,13 @@
 #include <cmath>
 #include <numbers>
 #include <random>
+#include <thread>
 #include <vector>
 
 #include <gtest/gtest.h>
 
 #include "support/virtual_run.h"
+#include "sweep/modal_dwell.h"
 #include "sweep/modal_estimate.h"
 #include "sweep/modal_settling.h"
 #include "sweep/model_trust.h"
@@ -146,6 +148,38 @@ TEST(ModalSettling, GivesUpAModelThatLacksAMode) {
   const Dwelt dwelt = dwell(prior_of({slow}, 0.01), 1e-4);
   EXPECT_EQ(dwelt.verdict, ModalVerdict::abandoned);
   EXPECT_EQ(dwelt.doubt, ModalDoubt::residual);
+}
+
+// A dwell at its limit: asked for beside the loop or at once, the best that is known is the same.
+TEST(ModalDwell, ConcludesBesideTheLoopAsItWouldAtOnce) {
+  constexpr double tone_hz = 2.0;
+  const double variance = 1e-4;  // too loud for the target
+  const auto concluded = [&](bool elsewhere) {
+    ModalDwell dwell{2, {1}, rate_hz};
+    if (elsewhere) dwell.solve_elsewhere();
+    dwell.know(prior_of({ringing, slow}, 0.01), {&variance, 1}, 1000.0);
+    dwell.start({.omega_rad_s = two_pi * tone_hz,
+                 .cycle_samples = 500,
+                 .least_samples = 400,
+                 .target_db = 0.005,
+                 .target_deg = 0.03});
+    ModalStore samples{2, 1000};
+    fill(samples, tone_hz, 1e-2, 700);
+    ModalSample applied;
+    ModalSample read;
+    for (std::uint64_t k = 0; k < samples.count(); ++k) {
+      EXPECT_TRUE(samples.sample(0, k, applied) && samples.sample(1, k, read));
+      const std::vector<Observation> observed{{.value = applied.value}, {.value = read.value}};
+      dwell.add(read.tone, observed);
+    }
+    while (!dwell.concluded()) std::this_thread::yield();
+    EXPECT_TRUE(dwell.live());
+    EXPECT_TRUE(dwell.conclude());
+    return dwell.result(0).estimate.response;
+  };
+  const std::complex<double> at_once = concluded(false);
+  EXPECT_NEAR(std::abs(at_once - true_tone), 0.0, 0.02);
+  EXPECT_EQ(concluded(true), at_once);
 }
 
 TEST(ModelTrust, DoubtsAfterTwoOfTenAndCondemnsWhatWasModelled) {
