@@ -62,5 +62,7 @@ function(sinerig_test name)
   target_link_libraries(${name} PRIVATE ${arg_LINK} GTest::gmock_main)
   target_compile_definitions(${name} PRIVATE
     SINERIG_SOURCE_DIR="${PROJECT_SOURCE_DIR}" SINERIG_BINARY="${PROJECT_BINARY_DIR}/sinerig")
-  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${arg_LABEL} TIMEOUT 600)
+  set(suppressions "${PROJECT_SOURCE_DIR}/cmake/tsan_suppressions.txt")
+  gtest_discover_tests(${name} DISCOVERY_TIMEOUT 60 PROPERTIES LABELS ${arg_LABEL} TIMEOUT 600
+    ENVIRONMENT TSAN_OPTIONS=suppressions=${suppressions})
 endfunction()
