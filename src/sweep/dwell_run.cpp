@@ -18,6 +18,9 @@ constexpr std::uint64_t max_dwell_stretch = 4;
 // The transient of a dwell's beginning is not to be taken for a wrong sign of a read-back.
 constexpr std::uint32_t blocks_before_check = 2;
 
+// The power of the command at most, as a multiple of its tones', for a read-back to be judged.
+constexpr double most_slow = 1.2;
+
 }  // namespace
 
 DwellRun::DwellRun(const SweepPlan& plan, const RunnerSettings& settings, std::size_t sensors,
@@ -29,7 +32,26 @@ DwellRun::DwellRun(const SweepPlan& plan, const RunnerSettings& settings, std::s
       sink_{sink},
       measurement_{1 + sensors,        plan.most_bins(), plan.most_tones(),
                    settings.responses, plan.judgement,   plan.rate_hz},
+      commanded_{plan.most_tones()},
       range_faults_(sensors) {}
+
+void DwellRun::CommandedBlock::add(const Excitation& excitation, bool begins) noexcept {
+  const double baseline = excitation.baseline();
+  if (begins) {
+    std::fill(leaked_.begin(), leaked_.end(), std::complex<double>{});
+    sum_ = square_ = 0.0;
+    first_ = baseline;
+  }
+  const double command = excitation.command() - first_;
+  sum_ += command;
+  square_ += command * command;
+  const double moved = baseline - first_;
+  if (moved == 0.0) return;
+  const auto phasors = excitation.phasors();
+  for (std::size_t tone = 0; tone < std::min(leaked_.size(), phasors.size()); ++tone) {
+    leaked_[tone] += moved * std::complex<double>{phasors[tone].sine, phasors[tone].cosine};
+  }
+}
 
 void DwellRun::begin(const Dwell& dwell, std::uint32_t index, std::uint32_t attempt, double scale,
                      std::uint64_t tick, bool by_detection) noexcept {
@@ -38,7 +60,9 @@ void DwellRun::begin(const Dwell& dwell, std::uint32_t index, std::uint32_t atte
   attempt_ = attempt;
   scale_ = scale;
   measurement_.start(dwell, by_detection);
-  settle_left_ = dwell.settle_samples;
+  // A change of amplitude that the plan has not foreseen takes longer than its ramp.
+  settle_left_ = dwell.settle_samples + std::max(excitation_.ramp_samples(), dwell.ramp_samples) -
+                 dwell.ramp_samples;
   blocks_ = 0;
   given_up_ = false;
   timing_ = {.dwell = index, .first_tick = tick};
@@ -75,6 +99,7 @@ void DwellRun::measure(std::uint64_t tick, std::span<const Observation> observat
     --settle_left_;
   } else {
     measurement_.add(excitation_.phasors(), observations);
+    if (blocks_ < blocks_before_check) commanded_.add(excitation_, measurement_.block_begins());
     if (measurement_.block_ended()) {
       put_block(tick, observations.size());
       if (blocks_ <= blocks_before_check) check_excitation(tick, observations[0].offset_ns);
@@ -110,6 +135,10 @@ void DwellRun::check_excitation(std::uint64_t tick, std::int64_t applied_offset_
   };
   const Dwell& dwell = *dwell_;
   const std::size_t tones = dwell.tones.size();
+  const auto length = static_cast<double>(dwell.block_samples);
+  const auto commanded = [&](std::size_t tone) {
+    return excitation_.commanded(tone) + commanded_.leaked(tone, length);
+  };
   for (std::size_t tone = 0; tone < tones; ++tone) {
     // What a bus reports a tick later was applied at the time that it says.
     const double angle_rad = 2.0e-9 * std::numbers::pi *
@@ -117,19 +146,24 @@ void DwellRun::check_excitation(std::uint64_t tick, std::int64_t applied_offset_
                              static_cast<double>(applied_offset_ns);
     refuse(check_applied(
                measurement_.block_coefficients(0, tone).phasor() * std::polar(1.0, -angle_rad),
-               excitation_.commanded(tone), settings_.min_excitation),
+               commanded(tone), settings_.min_excitation),
            no_sensor);
   }
   if (blocks_ < blocks_before_check) return;
+  double tones_power = 0.0;
+  for (std::size_t tone = 0; tone < tones; ++tone) tones_power += 0.5 * std::norm(commanded(tone));
+  // The slow part of the command is no foreign signal. Where it is more than a little, a block says
+  // nothing of a read-back behind a plant of its own.
+  const double all = commanded_.power(length) / tones_power;
+  if (all > most_slow) return;
   for (const std::size_t sensor : settings_.readbacks) {
     double tone_power = 0.0;
     for (std::size_t tone = 0; tone < tones; ++tone) {
       tone_power += 0.5 * std::norm(measurement_.block_coefficients(1 + sensor, tone).phasor());
     }
-    refuse(
-        check_readback(measurement_.block_coefficients(1 + sensor, 0).phasor(),
-                       excitation_.commanded(0), tone_power, measurement_.block_power(1 + sensor)),
-        static_cast<std::uint32_t>(sensor));
+    refuse(check_readback(measurement_.block_coefficients(1 + sensor, 0).phasor(), commanded(0),
+                          tone_power * all, measurement_.block_power(1 + sensor)),
+           static_cast<std::uint32_t>(sensor));
   }
 }
 
@@ -165,7 +199,7 @@ Point DwellRun::point(std::size_t pair, std::size_t tone) const noexcept {
          soft ? scale_ : 0.0);
   } else if (given_up_ && timing_.resettles > 0) {
     mark(PointStatus::rt_fault, PointReason::gaps, timing_.resettles);
-  } else if (!(excitation >= settings_.min_excitation)) {
+  } else if (point.reason != PointReason::no_data && !(excitation >= settings_.min_excitation)) {
     mark(PointStatus::low_signal, PointReason::no_excitation, excitation);
   } else if (range_faults_[sensor] > 0) {
     const auto ticks = static_cast<double>(timing_.ticks);

@@ -2,6 +2,8 @@
 // makes void, whether the excitation is there, what the points say of themselves.
 #pragma once
 
+#include <algorithm>
+#include <complex>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -61,6 +63,28 @@ class DwellRun {
   std::size_t responses() const noexcept { return measurement_.pairs().size(); }
 
  private:
+  // The command of the running block, whose slow part (an offset's ramp, a bias motion) leaks into
+  // the plain sums.
+  class CommandedBlock {
+   public:
+    explicit CommandedBlock(std::size_t tones) : leaked_(tones) {}
+    void add(const Excitation& excitation, bool begins) noexcept;
+    // Into the block's coefficients of a tone, b + j a, of `length` samples.
+    std::complex<double> leaked(std::size_t tone, double length) const noexcept {
+      return 2.0 / length * leaked_[tone];
+    }
+    // About its mean, slow part included.
+    double power(double length) const noexcept {
+      return std::max(0.0, square_ / length - sum_ * sum_ / (length * length));
+    }
+
+   private:
+    std::vector<std::complex<double>> leaked_;
+    double first_ = 0.0;  // baseline at its beginning: what all is counted from
+    double sum_ = 0.0;
+    double square_ = 0.0;
+  };
+
   void put_block(std::uint64_t tick, std::size_t channels) noexcept;
   void check_excitation(std::uint64_t tick, std::int64_t applied_offset_ns) noexcept;
 
@@ -70,6 +94,7 @@ class DwellRun {
   Guard& guard_;
   RecordSink& sink_;
   Measurement measurement_;
+  CommandedBlock commanded_;
   std::vector<std::uint64_t> range_faults_;  // per sensor
 
   const Dwell* dwell_ = nullptr;

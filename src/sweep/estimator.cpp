@@ -42,6 +42,7 @@ WindowEstimator::WindowEstimator(std::size_t max_bins)
       whole_{1 + 2 * max_bins},
       late_{1 + 2 * max_bins},
       part_input_(max_bins),
+      part_input_noise_(max_bins),
       column_(2 + 2 * max_bins),
       moved_output_(2 + 2 * max_bins),
       moved_input_(2 + 2 * max_bins),
@@ -116,6 +117,7 @@ bool WindowEstimator::estimate(const Regression& regression, const Window& windo
   const std::size_t order = regression.order();
   tones_ = estimates.size();
   harmonics_ = harmonics;
+  input_silent_ = false;
   if (!solve(regression, window, pair.input, input_)) return false;
   if (!solve(regression, window, pair.output, output_)) return false;
   const auto length =
@@ -128,7 +130,8 @@ bool WindowEstimator::estimate(const Regression& regression, const Window& windo
     estimate.samples = output_.sums.count;
     estimate.lost = length - output_.sums.count;
     take_coefficients(pair, order, tone, estimate);
-    if (estimate.input == std::complex<double>{}) return false;
+    input_silent_ = estimate.input == std::complex<double>{};
+    if (input_silent_) return false;
   }
   take_distortion(pair, order, estimates[0]);
   take_clusters(regression, window, pair, estimates);
@@ -192,6 +195,7 @@ void WindowEstimator::take_coefficients(const Pair& pair, std::size_t order, std
     return Covariance2{block[0][0], block[0][1], block[1][1]};
   };
   estimate.white = multiplied(covariance(output_), output_.turn[tone] / estimate.input);
+  estimate.output_white = estimate.white.mean_variance();
   if (!pair.exact_input) {
     const auto by_input = -estimate.response * input_.turn[tone] / estimate.input;
     estimate.white = sum(estimate.white, multiplied(covariance(input_), by_input));
@@ -290,8 +294,10 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
       estimate.scatter = 0.0;
       continue;
     }
+    // What is expected of white noise in the output alone: what the input's adds has scattered,
+    // too.
     const double to_white = output_.variance(order) / std::norm(estimate.input);
-    estimate.scatter *= estimate.white.mean_variance() / (estimate.scatter_white * to_white);
+    estimate.scatter *= estimate.output_white / (estimate.scatter_white * to_white);
     estimate.scatter_dof = 2.0 * (clusters - 1.0);
     estimate.burst = others > 0.0 ? worst / others : 1.0;
   }
@@ -346,11 +352,19 @@ bool WindowEstimator::stray(const Regression& regression, const Window& window,
     return std::complex<double>{late_.beta[a + 1] - whole_.beta[a + 1],
                                 late_.beta[a] - whole_.beta[a]};
   };
+  const auto spread = [&](std::size_t tone) {
+    const std::size_t a = 1 + 2 * tone;
+    return std::max(0.0, late_.spread[a] + late_.spread[a + 1] - whole_.spread[a] -
+                             whole_.spread[a + 1]);
+  };
   std::fill_n(part_input_.begin(), tones, std::complex<double>{});
+  std::fill_n(part_input_noise_.begin(), tones, 0.0);
   if (!pair.exact_input) {
     if (!difference(pair.input)) return false;
     for (std::size_t tone = 0; tone < tones; ++tone) {
       part_input_[tone] = moved(tone) * input_.turn[tone];
+      // Where the window cannot tell noise from a transient, only what is remembered counts.
+      if (!std::isfinite(most_noise)) part_input_noise_[tone] = late_.variance * spread(tone);
     }
   }
   if (!difference(pair.output)) return false;
@@ -358,12 +372,10 @@ bool WindowEstimator::stray(const Regression& regression, const Window& window,
   for (std::size_t tone = 0; tone < tones; ++tone) {
     const Estimate& estimate = estimates[tone];
     const auto shift = moved(tone) * output_.turn[tone] - estimate.response * part_input_[tone];
-    const std::size_t a = 1 + 2 * tone;
-    const double spread =
-        late_.spread[a] + late_.spread[a + 1] - whole_.spread[a] - whole_.spread[a + 1];
-    strays[tone] = {
-        .shift = std::abs(shift / estimate.output),
-        .noise = std::sqrt(variance * std::max(0.0, spread)) / std::abs(estimate.output)};
+    const double noise =
+        variance * spread(tone) + std::norm(estimate.response) * part_input_noise_[tone];
+    strays[tone] = {.shift = std::abs(shift / estimate.output),
+                    .noise = std::sqrt(noise) / std::abs(estimate.output)};
   }
   return true;
 }

@@ -48,6 +48,7 @@ struct Estimate {
   std::complex<double> input;  // U and Y at their true times, b + j a
   std::complex<double> output;
   Covariance2 white;            // of H, were the residual white
+  double output_white = 0.0;    // … mean variance of a component, by the output's residual alone
   double scatter = 0.0;         // variance of one component of H from the clusters
   double scatter_white = 0.0;   // what that scatter is to white noise of one in the output
   double scatter_dof = 0.0;     // 0: too few clusters
@@ -77,6 +78,9 @@ class WindowEstimator {
                 std::span<const double> omega_rad_s, std::size_t harmonics,
                 std::span<Estimate> estimates) noexcept SINERIG_NONBLOCKING;
 
+  // Of the estimate that failed: the input holds nothing at all.
+  bool input_silent() const noexcept { return input_silent_; }
+
   // Whether a channel is its tones alone over the window, on a constant or a bias motion, within a
   // millionth.
   bool is_sinusoidal(const Regression& regression, const Window& window, std::size_t channel,
@@ -91,6 +95,8 @@ class WindowEstimator {
              std::span<Stray> strays) noexcept SINERIG_NONBLOCKING;
 
  private:
+  bool input_silent_ = false;
+
   // The solution of one channel over the window.
   struct Solution {
     NormalSums sums;
@@ -147,6 +153,7 @@ class WindowEstimator {
   Plain whole_;
   Plain late_;
   std::vector<std::complex<double>> part_input_;  // per tone
+  std::vector<double> part_input_noise_;  // variance of that
   std::vector<double> column_;
   std::vector<double> moved_output_;
   std::vector<double> moved_input_;

@@ -6,6 +6,23 @@
 
 namespace sinerig {
 
+namespace {
+
+constexpr double two_pi = 2.0 * std::numbers::pi;
+
+// An amplitude is the same within this, relative: what is left are rounding errors.
+constexpr double same_loudness = 1e-9;
+
+// What a change of amplitude that no plan has foreseen may add to the step of the tones, where the
+// limit leaves no more.
+constexpr double least_free_part = 0.02;
+
+std::uint64_t ticks(double samples) noexcept {
+  return static_cast<std::uint64_t>(std::ceil(samples));
+}
+
+}  // namespace
+
 Excitation::Excitation(std::size_t max_tones, std::size_t max_bins, const Baseline& baseline)
     : baseline_{baseline},
       oscillation_{baseline.oscillation.cycles, baseline.oscillation.samples},
@@ -21,49 +38,86 @@ double Excitation::carried_phase_rad() const noexcept {
   return std::atan2(at.sine, at.cosine) + voices_[0].start_rad;
 }
 
+// For what the tones stand above the baseline to go: as fast as they moved, or as is allowed beside
+// the oscillation.
+std::uint64_t Excitation::fade_samples(std::uint64_t least) const noexcept {
+  const double distance = std::abs(tones());
+  if (!(tone_step_ > 0.0) || distance <= same_loudness * loudness_) return least;
+  const double step = std::min(tone_step_, baseline_.free_step());
+  return distance <= step ? least : std::max(least, ticks(distance / step));
+}
+
+// For a single tone's way to `loudness`: as many ticks as the limit asks for, and half a cycle
+// where the plan of its dwell has foreseen no change.
+std::uint64_t Excitation::change_samples(const Dwell& dwell, double loudness) const noexcept {
+  const double change = std::abs(loudness - loudness_);
+  if (tones_ == 0 || change <= same_loudness * loudness) return 0;
+  const double cycle_samples =
+      static_cast<double>(dwell.block_samples) / static_cast<double>(dwell.tones.front().cycles);
+  const double step = std::max(loudness, loudness_) * two_pi / cycle_samples;
+  const double allowed = baseline_.free_step();
+  const double free = std::max(allowed - step, least_free_part * allowed);
+  const double least = dwell.ramp_samples == 0 ? 0.5 * cycle_samples : 0.0;
+  return ticks(std::max(least, change / free));
+}
+
 void Excitation::start(const Dwell& dwell, double scale) noexcept {
-  const double last = tones_ == 0 ? 0.0 : tones();
+  const double last = tones();
   const bool several = tones_ > 1 || dwell.tones.size() > 1;
   const double carried = tones_ == 1 && dwell.tones.size() == 1 ? carried_phase_rad() : 0.0;
+  double loudness = 0.0;
+  for (const Tone& tone : dwell.tones) loudness = std::max(loudness, scale * tone.amplitude);
+  ramp_samples_ = dwell.ramp_samples;
+  if (!several) ramp_samples_ = std::max(ramp_samples_, change_samples(dwell, loudness));
+  const double loudness_before = loudness_;
   tones_ = dwell.tones.size();
   bins_ = dwell.bins();
   elapsed_ = 0;
-  ramp_samples_ = dwell.ramp_samples;
-  double loudness = 0.0;
-  for (const Tone& tone : dwell.tones) loudness = std::max(loudness, scale * tone.amplitude);
-  // Only upward: a larger amplitude carried into a dwell would exceed what its plan was checked
-  // for.
-  from_scale_ = several ? 1.0 : std::min(1.0, loudness_ / loudness);
-  handover_ = 0.0;
+  waveform_ = {};
   loudness_ = loudness;
+  tone_step_ = 0.0;
   for (std::size_t i = 0; i < tones_; ++i) {
     const Tone& tone = dwell.tones[i];
-    const double start_rad = std::remainder(tone.phase_rad + carried, 2.0 * std::numbers::pi);
+    const double start_rad = std::remainder(tone.phase_rad + carried, two_pi);
+    const double amplitude = scale * tone.amplitude;
     voices_[i] = {.phase = PhaseCounter{tone.cycles, dwell.block_samples},
-                  .in_phase = scale * tone.amplitude * std::cos(start_rad),
-                  .quadrature = scale * tone.amplitude * std::sin(start_rad),
+                  .in_phase = amplitude * std::cos(start_rad),
+                  .quadrature = amplitude * std::sin(start_rad),
                   .start_rad = start_rad};
+    tone_step_ += amplitude * two_pi * static_cast<double>(tone.cycles) /
+                  static_cast<double>(dwell.block_samples);
   }
   refresh();
-  if (several) handover_ = last - tones();
+  if (several) {
+    from_scale_ = 0.0;
+    handover_ = last;
+  } else {
+    from_scale_ = std::min(1.0, loudness_before / loudness);
+    handover_ = std::max(0.0, loudness_before / loudness - 1.0) * tones_at_full();
+  }
 }
 
 void Excitation::rest() noexcept {
   tones_ = 0;
   loudness_ = 0.0;
+  tone_step_ = 0.0;
   run_ticks_ = 0;
+  oscillation_ = PhaseCounter{baseline_.oscillation.cycles, baseline_.oscillation.samples};
   handover_ = 0.0;
   waveform_ = {};
 }
 
-void Excitation::start(std::span<const double> waveform, std::uint64_t ramp_samples) noexcept {
+void Excitation::start(std::span<const double> waveform, std::uint64_t ramp_samples,
+                       double scale) noexcept {
+  ramp_samples_ = fade_samples(ramp_samples);
   handover_ = tones();
-  ramp_samples_ = ramp_samples;
   waveform_ = waveform;
+  waveform_scale_ = scale;
   tones_ = 0;
   bins_ = 0;
   elapsed_ = 0;
   loudness_ = 0.0;
+  tone_step_ = 0.0;
 }
 
 void Excitation::advance(std::uint64_t ticks) noexcept {
@@ -89,20 +143,23 @@ void Excitation::refresh() noexcept {
   if (baseline_.oscillates()) phasors_[harmonics_end] = oscillation_phasor_;
 }
 
-double Excitation::tones() const noexcept {
-  if (tones_ == 0) {
-    const double value = elapsed_ < waveform_.size() ? waveform_[elapsed_] : 0.0;
-    if (elapsed_ >= ramp_samples_) return value;
-    return value +
-           handover_ * (1.0 - static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_));
-  }
+double Excitation::tones_at_full() const noexcept {
   double sum = 0.0;
   for (std::size_t i = 0; i < tones_; ++i) {
     sum += voices_[i].in_phase * phasors_[i].sine + voices_[i].quadrature * phasors_[i].cosine;
   }
-  if (elapsed_ >= ramp_samples_) return sum;
-  const double progress = static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_);
-  return sum * (from_scale_ + (1.0 - from_scale_) * progress) + handover_ * (1.0 - progress);
+  return sum;
+}
+
+double Excitation::tones() const noexcept {
+  const bool ramping = elapsed_ < ramp_samples_;
+  const double progress =
+      ramping ? static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_) : 1.0;
+  const double fading = ramping ? handover_ * (1.0 - progress) : 0.0;
+  if (tones_ == 0) {
+    return fading + (elapsed_ < waveform_.size() ? waveform_scale_ * waveform_[elapsed_] : 0.0);
+  }
+  return tones_at_full() * (from_scale_ + (1.0 - from_scale_) * progress) + fading;
 }
 
 double Excitation::baseline() const noexcept {
@@ -122,7 +179,11 @@ double Excitation::command() const noexcept {
 
 void Excitation::close() noexcept {
   closing_from_ = command();
-  closing_samples_ = baseline_.ramp_samples;
+  const double distance = std::abs(closing_from_ - baseline_.neutral);
+  closing_samples_ = fade_samples(baseline_.ramp_samples);
+  if (distance > baseline_.max_step) {
+    closing_samples_ = std::max(closing_samples_, ticks(distance / baseline_.max_step));
+  }
   elapsed_ = 0;
   closing_ = true;
 }

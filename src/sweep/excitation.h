@@ -18,27 +18,34 @@ class Excitation {
  public:
   Excitation(std::size_t max_tones, std::size_t max_bins, const Baseline& baseline);
 
-  // Begins a dwell. A single tone goes on from the phase that the single tone before has reached,
-  // so that the command has no step; after whole cycles that is zero. Where there are several tones
-  // the step is faded out over the ramp. Over the ramp the envelope
-  // moves from the amplitude of the dwell before to `scale` times the planned one: no step there
-  // either.
+  // Begins a dwell. The command has no step and, on the way, is nowhere beyond the larger of both
+  // dwells: a single tone goes on from the phase that the single tone before has reached (after
+  // whole cycles that is zero), its envelope moves up over the ramp to `scale` times the planned
+  // amplitude, and what a louder one before stood above it fades out; several tones are faded in
+  // while what was there fades out.
   void start(const Dwell& dwell, double scale) noexcept SINERIG_NONBLOCKING;
+
+  // Of the dwell or the waveform that has begun: the planned ramp, or what a change of amplitude
+  // takes that no plan has foreseen (after a pre-flight, a soft limit).
+  std::uint64_t ramp_samples() const noexcept { return ramp_samples_; }
 
   // The command has been taken to neutral: the next dwell begins from there.
   void rest() noexcept SINERIG_NONBLOCKING;
 
-  // Begins a waveform laid on the baseline, one value per tick, zero beyond its end. Over the ramp
-  // the tones before fade out.
-  void start(std::span<const double> waveform,
-             std::uint64_t ramp_samples) noexcept SINERIG_NONBLOCKING;
+  // Begins a waveform laid on the baseline, `scale` times one value per tick, zero beyond its end.
+  // Over the ramp, which is as long as that takes, the tones before fade out.
+  void start(std::span<const double> waveform, std::uint64_t ramp_samples,
+             double scale = 1.0) noexcept SINERIG_NONBLOCKING;
 
   // Moves on by `ticks`.
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
 
   double command() const noexcept SINERIG_NONBLOCKING;
+  // What of it is no tone.
+  double baseline() const noexcept SINERIG_NONBLOCKING;
 
-  // The end of the sweep: from here on the command goes from where it is to neutral.
+  // The end of the sweep: from here on the command goes from where it is to neutral, no faster than
+  // the tones have moved it and than its limit allows.
   void close() noexcept SINERIG_NONBLOCKING;
   bool closed() const noexcept { return closing_ && elapsed_ >= closing_samples_; }
 
@@ -61,7 +68,9 @@ class Excitation {
 
   double carried_phase_rad() const noexcept;
   double tones() const noexcept;
-  double baseline() const noexcept;
+  double tones_at_full() const noexcept;
+  std::uint64_t fade_samples(std::uint64_t least) const noexcept;
+  std::uint64_t change_samples(const Dwell& dwell, double loudness) const noexcept;
   void refresh() noexcept;
 
   Baseline baseline_;
@@ -74,10 +83,12 @@ class Excitation {
   std::size_t bins_ = 0;
   std::uint64_t elapsed_ = 0;
   std::uint64_t ramp_samples_ = 0;
-  double loudness_ = 0.0;  // largest amplitude of the running dwell
-  double handover_ = 0.0;  // what the tones before stood above these at the start, of several tones
+  double loudness_ = 0.0;    // largest amplitude of the running dwell
+  double tone_step_ = 0.0;   // the tones' largest change per tick
+  double handover_ = 0.0;    // what fades out over the ramp
   double from_scale_ = 1.0;  // where the envelope begins, of the running dwell's amplitudes
   std::span<const double> waveform_;
+  double waveform_scale_ = 1.0;
   bool closing_ = false;
   std::uint64_t closing_samples_ = 0;
   double closing_from_ = 0.0;

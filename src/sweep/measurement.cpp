@@ -137,6 +137,7 @@ void Measurement::add(std::span<const Phasor> phasors,
     block_complete_ = true;
     regression_.begin_block();
   }
+  begins_ = in_block_ == 0;
   regression_.add(phasors, observations);
   for (const Observation& each : observations) block_complete_ = block_complete_ && !each.missing;
   ++samples_;

@@ -62,6 +62,8 @@ class Measurement {
   // The dwell has been measured as far as it will be.
   bool done() const noexcept { return done_; }
 
+  // The last add() was the first of a block.
+  bool block_begins() const noexcept { return begins_; }
   // A complete block of whole cycles has ended with the last add(); its plain sums.
   bool block_ended() const noexcept { return block_ended_; }
   Coefficients block_coefficients(std::size_t channel, std::size_t tone) const noexcept {
@@ -107,6 +109,7 @@ class Measurement {
     double left = 0.0;   // what the transient may have left in H, relative
     bool still = false;  // nothing of the transient is left that the tolerance would see
     bool known = false;
+    bool no_input = false;  // not known because nothing was applied
   };
 
   void judge() noexcept;
@@ -169,6 +172,7 @@ class Measurement {
   bool whole_blocks_ = false;
   bool block_complete_ = true;
   bool block_ended_ = false;
+  bool begins_ = false;
   bool done_ = false;
   bool taught_ = false;  // the memories have taken in this dwell
 };

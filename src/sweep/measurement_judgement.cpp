@@ -89,6 +89,7 @@ bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {
   for (std::size_t tone = 0; tone < tones; ++tone) {
     Result& each = result(pair, tone);
     each.known = solved;
+    each.no_input = !solved && estimator_.input_silent();
     if (!solved) continue;
     each.estimate = estimates_[tone];
     each.variance = memories_[pair].pooled(each.estimate, omega_[tone] / (2.0 * std::numbers::pi));

@@ -15,6 +15,9 @@ constexpr double db_per_relative = 20.0 / std::numbers::ln10;
 // At 6 the end of a transient was taken for a burst in 2 of 1000 clean points.
 constexpr double burst_ratio = 25.0;
 
+// An amplitude below this part of the output's rms about its first sample is no amplitude.
+constexpr double rounding = 1e-12;
+
 }  // namespace
 
 SettledBy Measurement::settled_by() const noexcept {
@@ -39,6 +42,8 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
     point.covariance = {nan, nan, nan};
     point.gain_interval_db = nan;
     point.phase_interval_deg = nan;
+    point.status = PointStatus::low_signal;
+    point.reason = each.no_input ? PointReason::no_excitation : PointReason::no_data;
     return point;
   }
   const Interval half = interval(each);
@@ -70,7 +75,8 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
     point.reason = reason;
     point.reason_value = value;
   };
-  if (point.output_amplitude == 0.0 && estimate.residual_rms == 0.0) {
+  // What has stopped in the midst of a dwell leaves the rounding of the totals.
+  if (point.output_amplitude <= rounding * estimate.rms && !real_noise) {
     mark(PointStatus::low_signal, PointReason::stuck, 0.0);
   } else if (!each.still) {
     mark(PointStatus::unsettled, PointReason::still_moving, db_per_relative * each.left);

@@ -25,6 +25,11 @@ double sine_slew(double amplitude, double frequency_hz, double rate_hz) {
   return 2.0 * amplitude * std::sin(two_pi * frequency_hz / rate_hz / 2.0) * rate_hz;
 }
 
+// Of the slow oscillation that all dwells are laid on.
+double bias_omega_rad_s(const SweepSettings& sweep) {
+  return sweep.bias_amplitude > 0.0 ? two_pi * sweep.bias_hz : 0.0;
+}
+
 // What a dwell asks of the rig at most.
 struct Motion {
   double amplitude = 0.0;
@@ -61,7 +66,11 @@ Motion motion_of(const Dwell& dwell, double rate_hz) {
 
 void check_motion(const SweepSettings& sweep, const MotionLimits& limits, const Dwell& dwell,
                   double rate_hz) {
-  const Motion motion = motion_of(dwell, rate_hz);
+  Motion motion = motion_of(dwell, rate_hz);
+  const double bias_rad_s = bias_omega_rad_s(sweep);
+  motion.slew_per_s += sweep.bias_amplitude * bias_rad_s;
+  motion.velocity += sweep.bias_amplitude * bias_rad_s;
+  motion.acceleration += sweep.bias_amplitude * bias_rad_s * bias_rad_s;
   const char* amplitude_key = sweep.amplitude_table.empty() ? "amplitude" : "amplitude_table";
   const auto refuse = [&](const char* what, double value, const char* limit_key, double limit) {
     throw PlanRefused("sweep", amplitude_key,
@@ -89,9 +98,19 @@ void check_motion(const SweepSettings& sweep, const MotionLimits& limits, const 
   }
 }
 
-void check_baseline(const Baseline& baseline, const MotionLimits& limits, double rate_hz) {
+namespace {
+
+// Beside the oscillation's own.
+double slew_from_neutral(const Baseline& baseline, double rate_hz) {
   const double ramp_ticks = std::max(1.0, static_cast<double>(baseline.ramp_samples));
-  const double slew_per_s = std::abs(baseline.offset) / ramp_ticks * rate_hz;
+  const double growing = std::min(baseline.amplitude / ramp_ticks, baseline.step());
+  return (std::abs(baseline.offset) / ramp_ticks + growing) * rate_hz;
+}
+
+}  // namespace
+
+void check_baseline(const Baseline& baseline, const MotionLimits& limits, double rate_hz) {
+  const double slew_per_s = slew_from_neutral(baseline, rate_hz) + baseline.step() * rate_hz;
   if (slew_per_s <= limits.slew_per_s) return;
   throw PlanRefused("sweep", "offset",
                     "a slew of " + number(slew_per_s) +
@@ -101,22 +120,48 @@ void check_baseline(const Baseline& baseline, const MotionLimits& limits, double
 
 // A dwell may begin anywhere in the cycle: a change of amplitude needs half a cycle at least, or
 // the command would jump. The envelope adds to the slew of the sine, change / ramp per tick, or
-// change · ω from rest where the ramp is shorter than the sine takes to get there.
-void check_ramp(const Dwell& dwell, double amplitude_before, const MotionLimits& limits,
-                double rate_hz) {
-  const double amplitude = dwell.tones.front().amplitude;
-  if (dwell.tones.size() > 1 || dwell.ramp_samples == 0 || amplitude == amplitude_before) return;
+// change · ω from rest where the ramp is shorter than the sine takes to get there. Several tones
+// fade in while what was there fades out. The first dwell rides on the way from neutral.
+void check_ramp(const Dwell& dwell, const Dwell* before, double least, const Baseline& baseline,
+                const MotionLimits& limits, double rate_hz) {
+  if (dwell.ramp_samples == 0) return;
   const double frequency_hz = dwell.frequency_hz(rate_hz);
-  const double slew_per_s =
-      sine_slew(std::max(amplitude, amplitude_before), frequency_hz, rate_hz) +
-      std::abs(amplitude - amplitude_before) *
-          std::min(rate_hz / static_cast<double>(dwell.ramp_samples), two_pi * frequency_hz);
+  const double per_s = rate_hz / static_cast<double>(dwell.ramp_samples);
+  double slew_per_s = baseline.step() * rate_hz;
+  if (before == nullptr) slew_per_s += slew_from_neutral(baseline, rate_hz);
+  if (dwell.tones.size() > 1 || (before != nullptr && before->tones.size() > 1)) {
+    const Motion motion = motion_of(dwell, rate_hz);
+    const double last = before != nullptr ? motion_of(*before, rate_hz).amplitude : 0.0;
+    slew_per_s += motion.slew_per_s + (motion.amplitude + last) * per_s;
+  } else {
+    const double amplitude = dwell.tones.front().amplitude;
+    const double planned = before != nullptr ? before->tones.front().amplitude : 0.0;
+    const double loudest = std::max(amplitude, planned);
+    const double change =
+        std::max(std::abs(amplitude - planned), loudest - std::min(least, loudest));
+    if (change == 0.0) return;
+    slew_per_s +=
+        sine_slew(loudest, frequency_hz, rate_hz) + change * std::min(per_s, two_pi * frequency_hz);
+  }
   if (slew_per_s <= limits.slew_per_s) return;
   throw PlanRefused("sweep", "ramp_s",
                     "a slew of up to " + number(slew_per_s) + " on the ramp to " +
                         number(frequency_hz) +
                         " Hz: exceeds [limits] slew_per_s = " + number(limits.slew_per_s) +
                         "; lengthen the ramp, lower the amplitude there or raise the limit");
+}
+
+void check_bias(const Dwell& dwell, double bias_hz, double rate_hz) {
+  for (const Tone& tone : dwell.tones) {
+    const double apart_hz = std::abs(dwell.tone_hz(tone, rate_hz) - bias_hz);
+    const double resolved_hz = rate_hz / static_cast<double>(dwell.max_samples);
+    if (apart_hz >= resolved_hz) continue;
+    throw PlanRefused(
+        "sweep", "bias_hz",
+        number(bias_hz) + ": no dwell at " + number(dwell.tone_hz(tone, rate_hz)) +
+            " Hz is long enough to tell the bias motion from the tone; they must be " +
+            number(resolved_hz) + " Hz apart at least");
+  }
 }
 
 }  // namespace sinerig

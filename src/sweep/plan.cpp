@@ -30,6 +30,7 @@ constexpr double modelled_ramp = 1.0 / 16.0;
 
 // A candidate may follow any dwell: it always has the ramp of a change.
 const Dwell any_dwell{.tones = {{}, {}}};
+const Dwell at_rest{.tones = {{}}};
 
 std::string number(double value) {
   char text[32];
@@ -62,6 +63,12 @@ double whole_units(const Span& span, double samples_per_cycle, double rate_hz,
 
 void check_band(const SweepSettings& sweep, double rate_hz) {
   const auto check = [&](const char* key, double frequency_hz) {
+    if (frequency_hz > 0.0 && frequency_hz < rate_hz / max_dwell_samples) {
+      throw PlanRefused("sweep", key,
+                        number(frequency_hz) + " Hz: a cycle would last " +
+                            number(1.0 / frequency_hz) + " s; " +
+                            number(rate_hz / max_dwell_samples) + " Hz is the lowest at this rate");
+    }
     if (frequency_hz > 0.0 && frequency_hz < rate_hz / 2.0) return;
     throw PlanRefused("sweep", key,
                       number(frequency_hz) + ": must be above 0 and below half the loop rate (" +
@@ -120,7 +127,8 @@ Dwell make_dwell(double asked_hz, const CoherentFrequency& base, std::vector<Ton
     return tones.size() == 1 && other.tones.size() == 1 &&
            other.tones.front().amplitude == tones.front().amplitude;
   };
-  const bool changes = before == nullptr ? tones.size() > 1 : !same_amplitude(*before);
+  const bool changes =
+      sweep.level.wanted() || (before == nullptr ? tones.size() > 1 : !same_amplitude(*before));
   const double least_ramp =
       changes ? samples_per_cycle * (sweep.settling == Settling::model ? modelled_ramp : 0.5) : 0.0;
   const double ramp_samples = std::ceil(std::max(sweep.ramp_s * rate_hz, least_ramp) - 1e-9);
@@ -198,14 +206,28 @@ Dwell make_group(const std::vector<double>& asked_hz, const SweepSettings& sweep
   return make_dwell(asked_hz.front(), base, std::move(tones), sweep, rate_hz, before);
 }
 
-Baseline make_baseline(const SweepSettings& sweep, double rate_hz) {
+Baseline make_baseline(const SweepSettings& sweep, const MotionLimits& limits, double rate_hz) {
   Baseline baseline{.neutral = sweep.neutral, .offset = sweep.offset};
+  baseline.max_step = limits.slew_per_s / rate_hz;
   baseline.ramp_samples = static_cast<std::uint64_t>(std::ceil(sweep.ramp_s * rate_hz - 1e-9));
   if (sweep.bias_amplitude > 0.0) {
     baseline.amplitude = sweep.bias_amplitude;
     baseline.oscillation = snap(sweep.bias_hz, rate_hz, sweep.frequency_tolerance);
   }
   return baseline;
+}
+
+// The bias motion becomes a bin of its own; a harmonic that it falls on is not watched, nor are
+// those above.
+void lay_on(const Baseline& baseline, Dwell& dwell, double rate_hz) {
+  const double bias_hz = baseline.oscillation.hz(rate_hz);
+  check_bias(dwell, bias_hz, rate_hz);
+  dwell.bias_hz = bias_hz;
+  const double resolved_hz = rate_hz / static_cast<double>(dwell.max_samples);
+  for (std::uint32_t order = 2; order <= dwell.harmonics; ++order) {
+    if (std::abs(order * dwell.frequency_hz(rate_hz) - bias_hz) < resolved_hz)
+      dwell.harmonics = order - 1;
+  }
 }
 
 struct AskedGroup {
@@ -260,12 +282,12 @@ Refinement make_refinement(const SweepPlan& plan, const SweepSettings& sweep,
       }
       // What the limits do not allow is no candidate: the first pass has been checked.
       try {
+        if (plan.baseline.oscillates()) lay_on(plan.baseline, dwell, plan.rate_hz);
         check_motion(sweep, limits, dwell, plan.rate_hz);
-        check_ramp(dwell, 0.0, limits, plan.rate_hz);
+        check_ramp(dwell, &at_rest, unlimited, plan.baseline, limits, plan.rate_hz);
       } catch (const PlanRefused&) {
         continue;
       }
-      if (plan.baseline.oscillates()) dwell.bias_hz = plan.baseline.oscillation.hz(plan.rate_hz);
       last_hz = exact_hz;
       refinement.candidates.push_back(std::move(dwell));
     }
@@ -284,7 +306,13 @@ std::uint64_t SweepPlan::min_samples() const {
 std::uint64_t SweepPlan::max_samples() const {
   std::uint64_t sum = probe.command.size();
   for (const Dwell& dwell : dwells) sum += dwell.max_samples;
-  return sum;
+  return sum + refinement.max_samples();
+}
+
+std::uint64_t Refinement::max_samples() const {
+  std::uint64_t longest = 0;
+  for (const Dwell& dwell : candidates) longest = std::max(longest, dwell.max_samples);
+  return std::min<std::uint64_t>(most_points, candidates.size()) * longest;
 }
 
 std::size_t SweepPlan::most_tones() const {
@@ -321,7 +349,7 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
   check_band(sweep, rate_hz);
 
   SweepPlan plan{.rate_hz = rate_hz,
-                 .baseline = make_baseline(sweep, rate_hz),
+                 .baseline = make_baseline(sweep, limits, rate_hz),
                  .level = sweep.level,
                  .dwells = {}};
   check_baseline(plan.baseline, limits, rate_hz);
@@ -340,8 +368,9 @@ SweepPlan plan_sweep(const SweepSettings& sweep, const MotionLimits& limits, dou
                     [&](const Dwell& other) { return same_frequency(dwell, other); });
     if (duplicate) continue;
     check_motion(sweep, limits, dwell, rate_hz);
-    if (plan.baseline.oscillates()) dwell.bias_hz = plan.baseline.oscillation.hz(rate_hz);
-    check_ramp(dwell, before == nullptr ? 0.0 : before->tones.front().amplitude, limits, rate_hz);
+    if (plan.baseline.oscillates()) lay_on(plan.baseline, dwell, rate_hz);
+    check_ramp(dwell, before, sweep.level.wanted() ? sweep.level.least_amplitude : unlimited,
+               plan.baseline, limits, rate_hz);
     plan.dwells.push_back(std::move(dwell));
   }
   plan.probe = make_probe(sweep, limits, rate_hz);

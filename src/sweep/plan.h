@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -147,8 +148,18 @@ struct Baseline {
   double amplitude = 0.0;  // of a slow oscillation
   CoherentFrequency oscillation{};
   std::uint64_t ramp_samples = 0;
+  double max_step = unlimited;  // of the command per tick
 
   bool oscillates() const { return amplitude > 0.0; }
+  // Largest change per tick of the oscillation.
+  double step() const {
+    return oscillates()
+               ? 2.0 * std::numbers::pi * amplitude * static_cast<double>(oscillation.cycles) /
+                     static_cast<double>(oscillation.samples)
+               : 0.0;
+  }
+  // What of the largest step it leaves to others.
+  double free_step() const { return std::max(max_step - step(), 0.02 * max_step); }
 };
 
 // When a dwell has been measured well enough; the same for all dwells of a sweep.
@@ -171,6 +182,8 @@ struct Refinement {
   std::vector<Dwell> candidates;
   std::uint32_t most_points = 0;
   double tolerance_db = 0.5;
+
+  std::uint64_t max_samples() const;  // were all points added that may be
 };
 
 // What is played before the first dwell, on the baseline; see make_probe.
@@ -191,7 +204,7 @@ struct SweepPlan {
   Judgement judgement{};
 
   std::uint64_t min_samples() const;
-  std::uint64_t max_samples() const;
+  std::uint64_t max_samples() const;  // with all that refinement may add
   double min_seconds() const { return static_cast<double>(min_samples()) / rate_hz; }
   double max_seconds() const { return static_cast<double>(max_samples()) / rate_hz; }
 

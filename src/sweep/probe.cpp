@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <numbers>
 
@@ -31,11 +32,21 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   Probe probe{.command = {}, .quiet_samples = 0, .low_hz = *low, .high_hz = *high};
   const double wanted =
       sweep.probe_s > 0.0 ? sweep.probe_s * rate_hz : cycles_of_lowest / probe.low_hz * rate_hz;
+  if (sweep.probe_s > 0.0 && wanted > most_ticks) {
+    char rule[96];
+    std::snprintf(rule, sizeof rule, "%.6g: at this rate the probe lasts %.6g s at most",
+                  sweep.probe_s, most_ticks / rate_hz);
+    throw PlanRefused("sweep", "probe_s", rule);
+  }
   const double ticks = std::clamp(wanted, least_ticks, most_ticks);
   const auto quiet = static_cast<std::size_t>(quiet_part * ticks);
   const auto length = static_cast<std::size_t>(ticks);
   probe.quiet_samples = quiet;
   probe.command.assign(length, 0.0);
+  const double bias_rad_s = two_pi * sweep.bias_hz;
+  const double bias_velocity = sweep.bias_amplitude * bias_rad_s;
+  const double velocity_left = limits.velocity_max - bias_velocity;
+  const double acceleration_left = limits.acceleration_max - bias_velocity * bias_rad_s;
   const double octaves = std::log(std::max(probe.high_hz / probe.low_hz, 2.0));
   double phase = 0.0;
   double slew = 0.0;
@@ -44,8 +55,11 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   for (std::size_t k = quiet; k < length; ++k) {
     const double part = static_cast<double>(k - quiet) / static_cast<double>(length - quiet);
     const double hz = std::min(probe.low_hz * std::exp(octaves * part), 0.45 * rate_hz);
-    probe.command[k] = amplitude_at(sweep, hz) * std::sin(phase);
-    phase += two_pi * hz / rate_hz;
+    const double omega_rad_s = two_pi * hz;
+    const double amplitude = std::min({amplitude_at(sweep, hz), velocity_left / omega_rad_s,
+                                       acceleration_left / (omega_rad_s * omega_rad_s)});
+    probe.command[k] = amplitude * std::sin(phase);
+    phase += omega_rad_s / rate_hz;
     if (k == 0) continue;
     slew = std::max(slew, std::abs(probe.command[k] - probe.command[k - 1]) * rate_hz);
     peak = std::max(peak, std::abs(probe.command[k]));
@@ -54,8 +68,13 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   // The last half cycle would end in a step.
   std::fill(probe.command.begin() + static_cast<std::ptrdiff_t>(end), probe.command.end(), 0.0);
   const double baseline = sweep.neutral + sweep.offset;
-  const double room = std::min(limits.command_max - baseline, baseline - limits.command_min);
-  const double scale = std::min({1.0, room / peak, limits.slew_per_s / slew});
+  const double room =
+      std::min(limits.command_max - baseline, baseline - limits.command_min) - sweep.bias_amplitude;
+  const double free_slew = limits.slew_per_s - bias_velocity;
+  // Nothing is known of the rig yet: as quietly as a levelled sweep begins.
+  const double loudest = sweep.level.wanted() ? sweep.level.least_amplitude : unlimited;
+  const double scale =
+      std::max(0.0, std::min({1.0, room / peak, free_slew / slew, loudest / peak}));
   for (double& each : probe.command) each *= scale;
   return probe;
 }
@@ -77,7 +96,8 @@ Prober::Prober(const Probe& probe, const std::vector<std::size_t>& outputs, doub
              .applied = applied_,
              .outputs = {}};
   for (std::size_t i = 0; i < outputs.size(); ++i) {
-    record_.outputs.push_back({&values_[i * applied_.size()], applied_.size()});
+    record_.outputs.push_back(
+        std::span<const double>{values_}.subspan(i * applied_.size(), applied_.size()));
   }
 }
 
@@ -88,6 +108,12 @@ void Prober::again() noexcept {
   begins_ = true;
   count_ = 0;
   attempts_ = 0;
+}
+
+void Prober::restart() noexcept {
+  if (stage_ != Stage::playing) return;
+  begins_ = true;
+  count_ = 0;
 }
 
 void Prober::search() noexcept {

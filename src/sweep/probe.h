@@ -43,6 +43,8 @@ class Prober {
   void skip() noexcept { stage_ = Stage::done; }
 
   // The modes have to be found once more.
+  // The command has been at rest in between: plays from the beginning, where it still plays.
+  void restart() noexcept SINERIG_NONBLOCKING;
   void again() noexcept SINERIG_NONBLOCKING;
 
   // After it has run: nothing where it had nothing to do, or nothing was found.

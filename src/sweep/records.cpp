@@ -41,6 +41,7 @@ const char* to_string(PointReason reason) noexcept {
     case PointReason::gaps: return "gaps";
     case PointReason::guard_trip: return "guard_trip";
     case PointReason::soft_limit: return "soft_limit";
+    case PointReason::no_data: return "no_data";
   }
   return "unknown";
 }

@@ -50,6 +50,7 @@ enum class PointReason : std::uint8_t {
   noise_burst,         // power of the loudest cluster over that of the others
   guard_trip,          // see the event of the same tick
   soft_limit,          // at the lowest amplitude that was tried, this part of the planned one
+  no_data,             // the samples do not determine the tone: too few, or it cannot be told apart
 };
 
 const char* to_string(PointReason reason) noexcept;

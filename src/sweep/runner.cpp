@@ -114,12 +114,13 @@ bool SweepRunner::step(RunControl& control) noexcept {
 
   const bool closing = this->closing();
   const bool reviewing = review_.asked();
-  const bool probing = !closing && !reviewing && !preflight_ && prober_.running();
+  const bool probing = this->probing();
   const bool between_dwells = probing || reviewing;
   const bool new_dwell = !closing && !between_dwells && !run_.begun();
   if (new_dwell) begin_dwell(tick.index + 1 - ticks);
   const bool probe_begins = probing && prober_.begins();
-  if (probe_begins) excitation_.start(plan_.probe.command, plan_.probe.quiet_samples / 2);
+  if (probe_begins)
+    excitation_.start(plan_.probe.command, plan_.probe.quiet_samples / 2, probe_scale_);
   excitation_.advance(new_dwell || probe_begins ? ticks - 1 : ticks);
   if (!between_dwells) run_.pass(tick, ticks);
   ++outcome_.ticks;
@@ -141,7 +142,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
 
   if (guard_.trip().tripped()) {
     if (!guard_.finished()) return true;
-    return guard_.trip().soft && !closing && !between_dwells && pause(ticks);
+    return guard_.trip().soft && !closing && !reviewing && pause(ticks);
   }
   if (closing) return !excitation_.closed();
   const double lateness_s = std::chrono::duration<double>(tick.lateness).count();

@@ -70,8 +70,12 @@ class SweepRunner {
   void probe(bool disturbed) noexcept SINERIG_NONBLOCKING;
   void begin_dwell(std::uint64_t tick) noexcept;
   bool under_way() const noexcept { return dwell_ < dwells_.size() && run_.begun(); }
+  bool probing() const noexcept {
+    return !closing() && !review_.asked() && !preflight_ && prober_.running();
+  }
   bool keep_going() noexcept;
   bool pause(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
+  bool probe_lower() noexcept SINERIG_NONBLOCKING;
   bool recover(RunControl& control) noexcept;
   void conclude_dwell() noexcept;
   bool pass_preflight() noexcept;
@@ -109,6 +113,7 @@ class SweepRunner {
   Recovery recovery_;
   DwellRun run_;
   Prober prober_;
+  double probe_scale_ = 1.0;  // lowered by soft limits
   ModelTrust trust_;
   SweepReview review_;
   int reviews_ = 0;

@@ -8,10 +8,11 @@
 
 namespace sinerig {
 
-// After the actuator has been released: true when everything is armed again and the dwell begins
-// anew.
+// After the actuator has been released: true when everything is armed again and the dwell, or the
+// first pass, begins anew.
 bool SweepRunner::recover(RunControl& control) noexcept {
-  if (!under_way() || !recovery_.worth_it(guard_.trip())) return false;
+  const bool probing = this->probing();
+  if ((!under_way() && !probing) || !recovery_.worth_it(guard_.trip())) return false;
   tell_trip(EventKind::tripped);
   announce({.kind = EventKind::released, .dwell = dwell_, .tick = last_tick_});
   const Recovery::End end = recovery_.after_fault(dwell_, control);
@@ -29,7 +30,11 @@ bool SweepRunner::recover(RunControl& control) noexcept {
   from_rest_ = true;
   applied_known_ = false;
   paused_ = false;
-  repeat_dwell();
+  if (probing) {
+    prober_.restart();
+  } else {
+    repeat_dwell();
+  }
   return true;
 }
 
@@ -47,7 +52,12 @@ bool SweepRunner::pause(std::uint64_t ticks) noexcept {
     return true;
   }
   paused_ = false;
-  if (recovery_.spend_soft()) {
+  if (probing()) {
+    if (!probe_lower()) {
+      trip_told_ = no_tick;
+      return false;
+    }
+  } else if (recovery_.spend_soft()) {
     scale_ *= retry.soft_factor;
     announce({.kind = EventKind::retried,
               .dwell = dwell_,
@@ -66,6 +76,20 @@ bool SweepRunner::pause(std::uint64_t ticks) noexcept {
   guard_.resume();
   excitation_.rest();
   return keep_going();
+}
+
+// A soft limit has ended the first pass: once more, more quietly, or without it. False where the
+// sweep ends here.
+bool SweepRunner::probe_lower() noexcept {
+  if (recovery_.spend_soft()) {
+    probe_scale_ *= settings_.retry.soft_factor;
+    prober_.restart();
+    return true;
+  }
+  if (recovery_.soft_all_spent()) return false;
+  prober_.skip();
+  judge_model();
+  return true;
 }
 
 void SweepRunner::tell_trip(EventKind kind) noexcept {

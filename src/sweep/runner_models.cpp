@@ -66,6 +66,7 @@ void SweepRunner::judge_model() noexcept {
             .dwell = dwell_,
             .tick = last_tick_,
             .value = found != nullptr ? static_cast<double>(found->prior.modes) : 0.0});
+  if (!doubted) recovery_.next_dwell();
   if (doubted) next_dwell();
 }
 
@@ -85,7 +86,7 @@ void SweepRunner::review() noexcept {
   }
   // Nothing moves while the answer is waited for.
   excitation_.start(std::span<const double>{}, plan_.baseline.ramp_samples);
-  review_ramp_left_ = plan_.baseline.ramp_samples;
+  review_ramp_left_ = excitation_.ramp_samples();
 }
 
 void SweepRunner::hear_review() noexcept {

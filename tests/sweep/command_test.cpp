@@ -128,6 +128,110 @@ TEST(Command, IsRaisedForAFirstPointThatIsFarTooQuiet) {
   EXPECT_EQ(retries, 1);
 }
 
+// What is planned within its limits is played within them, from the first tick to the release.
+struct LimitedSweep {
+  const char* name;
+  void (*change)(SweepSettings&, RunnerSettings&, GuardSettings&);
+};
+
+class WithinItsLimits : public testing::TestWithParam<LimitedSweep> {};
+
+TEST_P(WithinItsLimits, TheCommandStays) {
+  SweepSettings sweep = across_the_resonance();
+  sweep.frequency_tolerance = 0.01;
+  RunnerSettings runner = recording();
+  GuardSettings guard = test::open_guard(1);
+  GetParam().change(sweep, runner, guard);
+  SweepPlan plan;
+  // The tightest limit that the plan takes.
+  double slew_per_s = 1.0;
+  for (;; slew_per_s *= 1.01) {
+    try {
+      plan = plan_sweep(sweep, {.slew_per_s = slew_per_s}, rate_hz);
+      break;
+    } catch (const PlanRefused&) {
+    }
+  }
+  guard.slew_per_s = slew_per_s;
+  double loudest = 0.0;
+  for (const Dwell& dwell : plan.dwells) {
+    double sum = 0.0;
+    for (const Tone& tone : dwell.tones) sum += tone.amplitude;
+    loudest = std::max(loudest, sum);
+  }
+  guard.command_max = std::abs(sweep.offset) + sweep.bias_amplitude + loudest * (1.0 + 1e-9);
+  guard.command_min = -guard.command_max;
+  const auto run = test::run_virtual(plan, resonance(), guard, runner);
+  EXPECT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"y"});
+  const std::vector<double> commands = commands_of(run);
+  EXPECT_LE(std::abs(commands.back()), slew_per_s / rate_hz) << "before the release";
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, WithinItsLimits,
+    testing::Values(
+        LimitedSweep{"ATableThatFalls",
+                     [](auto& sweep, auto&, auto&) {
+                       sweep.amplitude_table = {{.frequency_hz = 2.0, .amplitude = 0.5},
+                                                {.frequency_hz = 20.0, .amplitude = 0.02}};
+                     }},
+        LimitedSweep{"ATableThatFallsOverALongRamp",
+                     [](auto& sweep, auto&, auto&) {
+                       sweep.amplitude_table = {{.frequency_hz = 2.0, .amplitude = 0.5},
+                                                {.frequency_hz = 20.0, .amplitude = 0.02}};
+                       sweep.ramp_s = 1.0;
+                     }},
+        LimitedSweep{"AVelocityThatIsFollowed",
+                     [](auto& sweep, auto&, auto&) {
+                       sweep.follow_velocity = 10.0;
+                     }},
+        LimitedSweep{"ALevelThatIsKept",
+                     [](auto& sweep, auto&, auto&) {
+                       sweep.level = {
+                           .response = 0.4, .most_response = 0.6, .least_amplitude = 0.01};
+                     }},
+        LimitedSweep{"APreflight",
+                     [](auto& sweep, auto& runner, auto&) {
+                       sweep.amplitude = 0.1;
+                       runner.preflight = {.wanted = true, .level = 0.05};
+                     }},
+        LimitedSweep{"ASoftLimit",
+                     [](auto& sweep, auto& runner, auto& guard) {
+                       sweep.bias_amplitude = 0.1;
+                       sweep.bias_hz = 0.31;
+                       guard.channels[0].soft_max = 1.5;
+                       runner.retry = {.soft = 5, .soft_wait_s = 0.1};
+                     }},
+        LimitedSweep{"AnOffsetWithABiasMotion",
+                     [](auto& sweep, auto&, auto&) {
+                       sweep.offset = 1.0;
+                       sweep.bias_amplitude = 0.3;
+                       sweep.bias_hz = 0.31;
+                       sweep.ramp_s = 0.5;
+                     }},
+        LimitedSweep{"SeveralTones",
+                     [](auto& sweep, auto&, auto&) {
+                       sweep.tones = 4;
+                     }},
+        LimitedSweep{"ATransientThatIsModelled",
+                     [](auto& sweep, auto&, auto&) {
+                       sweep.settling = Settling::model;
+                       sweep.amplitude_table = {{.frequency_hz = 2.0, .amplitude = 0.5},
+                                                {.frequency_hz = 20.0, .amplitude = 0.02}};
+                     }}),
+    [](const auto& instance) { return std::string{instance.param.name}; });
+
+TEST(Command, OfSeveralTonesStaysWithinTheirPeakWhileOneGroupGivesWayToTheNext) {
+  SweepSettings sweep = across_the_resonance();
+  sweep.points = 24;
+  sweep.stop_hz = 100.0;
+  sweep.tones = 4;
+  sweep.frequency_tolerance = 0.01;
+  const auto run = test::run_virtual(plan_sweep(sweep, {}, rate_hz), resonance(),
+                                     test::open_guard(1), recording());
+  for (const double command : commands_of(run)) ASSERT_LE(std::abs(command), 0.5 + 1e-9);
+}
+
 Point point_of(PointStatus status, double gain, double amplitude) {
   Point point;
   point.status = status;

@@ -85,6 +85,23 @@ TEST(ExcitationCheck, IsContentWithAReadBackThatFollows) {
   EXPECT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"gyro"});
 }
 
+// A bias far larger than the tone leaks into the sums of its blocks, here with the sign turned.
+TEST(ExcitationCheck, IsContentWithABiasMotionThatDwarfsTheTone) {
+  for (const double bias_hz : {0.07, 0.11, 0.15, 0.3, 0.37}) {
+    SweepSettings sweep;
+    sweep.start_hz = 2.0;
+    sweep.stop_hz = 20.0;
+    sweep.points = 3;
+    sweep.amplitude = 0.02;
+    sweep.bias_amplitude = 0.3;
+    sweep.bias_hz = bias_hz;
+    const auto run = test::run_virtual(plan_sweep(sweep, {}, rate_hz), lag(), test::open_guard(1),
+                                       reading_back());
+    EXPECT_FALSE(run.outcome.trip.tripped())
+        << bias_hz << " Hz: " << describe(run.outcome.trip, {"gyro"});
+  }
+}
+
 TEST(ExcitationCheck, IsContentWithAClampedCoarseActuator) {
   auto rig = lag();
   rig.actuator.max = 0.3;

@@ -1,5 +1,6 @@
 // Transients that are modelled: closed forms, wrong poles that are found out, wrong orders that are
 // not believed.
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -227,6 +228,36 @@ SweepSettings modelled_sweep() {
   sweep.frequency_tolerance = 5e-3;
   sweep.settling = Settling::model;
   return sweep;
+}
+
+// Its chirp passes frequencies that no dwell has.
+TEST(Probe, MovesNoFasterThanIsAllowed) {
+  SweepSettings sweep = modelled_sweep();
+  sweep.points = 1;
+  sweep.start_hz = sweep.stop_hz = 10.0;
+  sweep.amplitude = 0.2;
+  const MotionLimits limits{.velocity_max = 13.0, .acceleration_max = 800.0};
+  const Probe probe = make_probe(sweep, limits, rate_hz);
+  double velocity = 0.0;
+  double acceleration = 0.0;
+  for (std::size_t k = 1; k + 1 < probe.command.size(); ++k) {
+    const double before = probe.command[k - 1];
+    const double here = probe.command[k];
+    const double after = probe.command[k + 1];
+    velocity = std::max(velocity, std::abs(after - before) * 0.5 * rate_hz);
+    if (here != 0.0 && after != 0.0 && before != 0.0)
+      acceleration =
+          std::max(acceleration, std::abs(after - 2.0 * here + before) * rate_hz * rate_hz);
+  }
+  EXPECT_LE(velocity, 1.02 * limits.velocity_max);
+  EXPECT_LE(acceleration, 1.1 * limits.acceleration_max);
+}
+
+TEST(Probe, BeginsAsQuietlyAsALevelledSweep) {
+  SweepSettings sweep = modelled_sweep();
+  sweep.level = {.response = 0.1, .most_response = 0.3, .least_amplitude = 0.05};
+  const Probe probe = make_probe(sweep, {}, rate_hz);
+  EXPECT_NEAR(*std::max_element(probe.command.begin(), probe.command.end()), 0.05, 1e-3);
 }
 
 TEST(Probe, StaysWithinTheLimitsAndEndsAtRest) {

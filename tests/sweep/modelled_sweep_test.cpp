@@ -97,16 +97,42 @@ TEST(ModelTrust, BelievesNoModesAfterAContradiction) {
   EXPECT_EQ(trust.next_condemned(1), 3U);
 }
 
+// Finds the mode of the axis in whatever it is shown.
+class ToldFinder final : public ModeFinder {
+ public:
+  bool find(const ProbeRecord& record, KnownModes& modes) noexcept override {
+    loudest = 0.0;
+    for (const double value : record.applied) loudest = std::max(loudest, std::abs(value));
+    modes = *told().modes;
+    return true;
+  }
+  double loudest = 0.0;
+};
+
+// The chirp goes through the resonance; a soft limit is answered as in a dwell.
+TEST(ModelledSweep, PlaysItsFirstPassMoreQuietlyAfterASoftLimit) {
+  ToldFinder finder;
+  RunnerSettings settings;
+  settings.finder = &finder;
+  settings.retry = {.soft = 5, .soft_wait_s = 0.1};
+  GuardSettings guard = test::open_guard(1);
+  guard.channels[0].soft_max = 0.04;
+  const test::VirtualRun run =
+      test::run_virtual(modelled_plan(0.0), damped_axis(), guard, settings);
+  EXPECT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"y"});
+  EXPECT_GT(run.outcome.soft_trips, 0U);
+  EXPECT_GT(finder.loudest, 0.0);
+  EXPECT_LT(finder.loudest, 0.6);
+  EXPECT_EQ(run.outcome.dwells_done, 16U);
+}
+
 // What an earlier part of the run has left: all dwells finished, two condemned.
 TEST(ModelledSweep, GoesOnWithWhatWasCondemned) {
   const SweepPlan plan = modelled_plan(0.0);
   const test::VirtualRun whole =
       test::run_virtual(plan, damped_axis(), test::open_guard(1), told());
-  FinishedDwells finished{.dwells = 16,
-                          .points = whole.sink.points,
-                          .lessons = {},
-                          .condemned = {3, 7},
-                          .refined = {}};
+  FinishedDwells finished{
+      .dwells = 16, .points = whole.sink.points, .lessons = {}, .condemned = {3, 7}, .refined = {}};
   VirtualClock clock{TickGrid{rate_hz}};
   const sim::SimulatedRigSettings settings = damped_axis();
   sim::SimulatedRig rig{settings, clock};

@@ -337,6 +337,37 @@ INSTANTIATE_TEST_SUITE_P(
                 {.velocity_max = 10.0},
                 "amplitude_table",
                 "a peak velocity of 12.5664 at 1 Hz"},
+        Refusal{"SlowerThanAnyDwell",
+                with([](SweepSettings& sweep) { sweep.start_hz = 1e-300; }),
+                {},
+                "start_hz",
+                "1e-300 Hz: a cycle would last 1e+300 s; 3.84615e-07 Hz is the lowest at this "
+                "rate"},
+        Refusal{"BiasOnATone",
+                with([](SweepSettings& sweep) {
+                  sweep.bias_amplitude = 0.1;
+                  sweep.bias_hz = 1.0;
+                }),
+                {},
+                "bias_hz",
+                "1: no dwell at 1 Hz is long enough to tell the bias motion from the tone"},
+        Refusal{"BiasAndSineTooFastForTheVelocity",
+                with([](SweepSettings& sweep) {
+                  sweep.points = 1;
+                  sweep.bias_amplitude = 1.0;
+                  sweep.bias_hz = 0.25;
+                }),
+                {.velocity_max = 4.0},
+                "amplitude",
+                "a peak velocity of 4.71239 at 1 Hz: exceeds [limits] velocity_max = 4"},
+        Refusal{"AProbeThatIsTooLong",
+                with([](SweepSettings& sweep) {
+                  sweep.settling = Settling::model;
+                  sweep.probe_s = 300.0;
+                }),
+                {},
+                "probe_s",
+                "300: at this rate the probe lasts 200 s at most"},
         Refusal{"LongerThanAMonth",
                 with([](SweepSettings& sweep) { sweep.integrate.seconds = 1e7; }),
                 {},
@@ -375,6 +406,26 @@ TEST(Plan, AllowsWhatReachesALimitAndNoMore) {
                             .velocity_max = 0.5 * two_pi * 50.0,
                             .acceleration_max = 0.5 * two_pi * 50.0 * (two_pi * 50.0)};
   EXPECT_EQ(plan_sweep(sweep, limits, rate_hz).dwells.size(), 1U);
+}
+
+TEST(Plan, DoesNotWatchAHarmonicThatTheBiasMotionFallsOn) {
+  SweepSettings sweep = a_list({0.5, 10.0});
+  sweep.bias_amplitude = 0.1;
+  sweep.bias_hz = 1.0;
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  EXPECT_EQ(plan.dwells[0].harmonics, 1U);
+  EXPECT_EQ(plan.dwells[1].harmonics, 3U);
+}
+
+TEST(Plan, CountsWhatRefinementMayAdd) {
+  SweepSettings sweep = a_sweep();
+  const std::uint64_t without = plan_sweep(sweep, {}, rate_hz).max_samples();
+  sweep.refine_points = 3;
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  std::uint64_t longest = 0;
+  for (const Dwell& dwell : plan.refinement.candidates)
+    longest = std::max(longest, dwell.max_samples);
+  EXPECT_EQ(plan.max_samples(), without + 3 * longest);
 }
 
 }  // namespace

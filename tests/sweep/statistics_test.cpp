@@ -158,5 +158,80 @@ TEST(Statistics, TheModeOfASecondResponseIsWaitedFor) {
   }
 }
 
+// A measured input has noise of its own, here most of the variance: 300 intervals, 285 ± 3.8.
+TEST(Statistics, IntervalsCoverWhereTheInputIsMeasured) {
+  SweepSettings sweep = ten_points();
+  sweep.target_db = 0.0;
+  sweep.target_deg = 0.0;
+  sweep.integrate = {.cycles = 4.0, .seconds = 1.0};
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  RunnerSettings runner;
+  runner.responses = {{.input = 2, .output = 1, .exact_input = false}};
+  int covered = 0;
+  int points = 0;
+  double width_db = 0.0;
+  double square_db = 0.0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    auto rig = rig_of(seed);
+    rig.sensors.resize(2);
+    rig.sensors[0].imperfections.noise_rms = 1e-4;
+    rig.sensors[1].signal = sim::Signal::plant_input;
+    rig.controller =
+        sim::ControllerSettings{.proportional = 1e-9, .injection = sim::Injection::plant_input};
+    rig.sensors[1].imperfections.noise_rms = 0.02;
+    for (const Point& point :
+         test::run_virtual(plan, rig, test::open_guard(2), runner).sink.points) {
+      EXPECT_NE(point.status, PointStatus::unsettled) << to_string(point.reason);
+      const double error_db = gain_error_db(point);
+      covered += error_db <= point.gain_interval_db ? 1 : 0;
+      width_db += point.gain_interval_db;
+      square_db += error_db * error_db;
+      ++points;
+    }
+  }
+  ASSERT_EQ(points, 300);
+  EXPECT_GE(covered, 267);
+  // Twice the error that there is, not twenty times.
+  EXPECT_LT(width_db / points, 3.0 * std::sqrt(square_db / points));
+}
+
+TEST(Points, WithoutAnEstimateAreNeverGood) {
+  SweepSettings sweep = ten_points();
+  sweep.settle_max = {.cycles = 2.0, .seconds = 0.5};
+  sweep.integrate_max = {.cycles = 2.0, .seconds = 0.5};
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  auto rig = rig_of(1);
+  rig.sensors.resize(2);
+  rig.sensors[1].imperfections.lost_fraction = 1.0;
+  for (const bool as_input : {false, true}) {
+    RunnerSettings runner;
+    runner.responses = {as_input ? Pair{.input = 2, .output = 1, .exact_input = false}
+                                 : Pair{.input = 0, .output = 2}};
+    const auto run = test::run_virtual(plan, rig, test::open_guard(2), runner);
+    ASSERT_EQ(run.sink.points.size(), 10U);
+    for (const Point& point : run.sink.points) {
+      EXPECT_EQ(point.status, PointStatus::low_signal);
+      EXPECT_EQ(point.reason, PointReason::no_data);
+    }
+  }
+}
+
+// What is left of a sensor that stops in the midst of a dwell is the rounding of the totals.
+TEST(Points, OfASensorThatStopsAreStuck) {
+  SweepSettings sweep = ten_points();
+  sweep.settle_max = {.cycles = 20.0, .seconds = 5.0};
+  for (const double at_s : {0.3, 0.7, 1.2}) {
+    auto rig = rig_of(1);
+    rig.sensors[0].imperfections.stuck_at_s = at_s;
+    sweep.points = 1;
+    sweep.harmonics = at_s < 0.5 ? 1 : 3;
+    sweep.integrate.seconds = 2.0;
+    const auto run = test::run_virtual(plan_sweep(sweep, {}, rate_hz), rig);
+    ASSERT_EQ(run.sink.points.size(), 1U);
+    EXPECT_NE(run.sink.points[0].status, PointStatus::good) << at_s;
+    EXPECT_EQ(run.sink.points[0].reason, PointReason::stuck) << at_s;
+  }
+}
+
 }  // namespace
 }  // namespace sinerig
