@@ -148,6 +148,14 @@ void SweepWriter::commit() {
 
 void SweepWriter::begin_part(const PartStart& start) {
   start_ = start;
+  attempts_.clear();
+  Statement earlier{*database_,
+                    "SELECT dwell, 1 + max(attempt) FROM (SELECT dwell, attempt FROM block "
+                    "UNION ALL SELECT dwell, attempt FROM lesson) GROUP BY dwell"};
+  while (earlier.step()) {
+    attempts_[static_cast<std::uint32_t>(earlier.integer(0))] =
+        static_cast<std::uint32_t>(earlier.integer(1));
+  }
   begin();
   database_->execute(
       "UPDATE part SET outcome = 'killed' WHERE outcome IS NULL;"
@@ -276,6 +284,7 @@ void SweepWriter::insert(const Event& event) {
   if (event.kind == EventKind::remeasured) {
     // What follows stands in place of what was.
     Statement{*database_, "DELETE FROM block WHERE dwell = ?"}.bind(event.dwell).run();
+    attempts_.erase(event.dwell);
   }
   if (event.kind == EventKind::refined) write_dwell(event.dwell, candidates_.at(event.candidate));
   Trip trip = event.trip;
@@ -318,7 +327,8 @@ void SweepWriter::insert(const Lesson& lesson) {
 
 // What was begun before the interruption keeps its rows.
 std::uint32_t SweepWriter::attempt_of(std::uint32_t dwell, std::uint32_t attempt) const {
-  return dwell == start_.dwell ? start_.attempt + attempt : attempt;
+  const auto earlier = attempts_.find(dwell);
+  return earlier == attempts_.end() ? attempt : earlier->second + attempt;
 }
 
 }  // namespace sinerig::record

@@ -1,6 +1,7 @@
 // Writes NAME.sweep, one SQLite database that holds everything about one run.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,8 +32,7 @@ struct RunInfo {
 // Where a part of a run begins.
 struct PartStart {
   std::uint32_t dwell = 0;
-  std::uint64_t tick = 0;     // of the file, for the part's own tick 0
-  std::uint32_t attempt = 0;  // of that dwell, for the part's own first
+  std::uint64_t tick = 0;  // of the file, for the part's own tick 0
 };
 
 class SweepWriter {
@@ -106,6 +106,7 @@ class SweepWriter {
   std::unique_ptr<Database> database_;
   std::unique_ptr<Statements> statements_;
   PartStart start_;
+  std::map<std::uint32_t, std::uint32_t> attempts_;  // by dwell: those of earlier parts
   std::vector<Record> pending_;  // since the last commit, but blocks and samples
   bool dwell_half_written_ = false;
 };

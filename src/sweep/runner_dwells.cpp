@@ -97,10 +97,13 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
       refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
       for (; point != finished.points.end() && point->dwell == dwell_ && point->tone == tone;
            ++point) {
-        if (point->pair == 0 && tone == 0) leveller_.accept(*point);
+        // What a soft limit gave up taught neither the level nor the model.
+        const bool given_up = point->status == PointStatus::stopped;
+        if (point->pair == 0 && tone == 0 && !given_up) leveller_.accept(*point);
         teach_refiner(*point);
         if (plan_.judgement.settling == Settling::model) review_.set(*point);
-        if (point->settled_by == SettledBy::model) trust_.dwell_ended(dwell_, true, false);
+        if (point->settled_by == SettledBy::model && !given_up)
+          trust_.dwell_ended(dwell_, true, false);
       }
       refiner_.learn();
     }
