@@ -219,6 +219,8 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
   const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   RunControl control;
   const StopOnSignal stop_on_signal{control};
+  std::optional<ServiceNotifier> own_service;
+  ServiceNotifier& service = options.service != nullptr ? *options.service : own_service.emplace();
   RunTeller teller{options.voice, options.table, rig, plan};
   const std::unique_ptr<LiveView> view =
       options.serve ? std::make_unique<LiveView>(*options.serve, rig, plan, clock, control)
@@ -257,7 +259,6 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
     writer->discard();
     throw;
   }
-  ServiceNotifier service;
   Played played;
   if (to_measure) {
     const bool keep_samples = rig.runner.record_samples || !view;
@@ -270,7 +271,11 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
                    .tick_s = in_real_time ? clock.grid().period_s() : 0.0});
   }
 
-  service.stopping();
+  if (own_service) {
+    service.stopping();
+  } else {
+    service.idle(std::chrono::steady_clock::now());
+  }
   RunEnd end{.outcome = played.disk_failure.empty() ? outcome_name(played.outcome) : "stopped",
              .reason = reason_of(played, outbox, configured),
              .sweep_file = writer->path(),

@@ -20,10 +20,8 @@ Tables tables_of(Database& database) {
   return tables;
 }
 
-// A run that was killed before its plan was on the disk leaves a database with nothing in it.
 void refuse_not_begun(const std::string& path) {
-  Database database{path, Database::Mode::read};
-  if (!tables_of(database).empty()) return;
+  if (is_begun(path)) return;
   throw SweepFileError(path +
                        ": is not a sweep file, or one whose run was killed before it began: "
                        "there is nothing to resume");
@@ -192,6 +190,11 @@ bool same(const Dwell& a, const Dwell& b) {
 }
 
 }  // namespace
+
+bool is_begun(const std::string& path) {
+  Database database{path, Database::Mode::read};
+  return !tables_of(database).empty();
+}
 
 UnfinishedRun read_unfinished(const std::string& path) {
   refuse_not_begun(path);

@@ -20,6 +20,11 @@ struct UnfinishedRun {
   bool done() const { return stored.fact("outcome") == "done"; }
 };
 
+// False for what a run leaves that was killed before its plan was on the disk: an empty file, or a
+// database with nothing in it. Throws SweepFileError for what cannot be read: nobody knows what is
+// lost with that.
+bool is_begun(const std::string& path);
+
 // A dwell is finished when its timing is on record, which is written last, and the sweep did not
 // end in it; the first that is not is where the run goes on. What a soft limit has given up is
 // finished. Throws SweepFileError for what is no sweep file, and for one that this version would
