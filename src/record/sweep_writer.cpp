@@ -71,8 +71,11 @@ struct SweepWriter::Statements {
 };
 
 SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists if_exists)
-    : path_{path}, candidates_{info.plan.refinement.candidates}, created_{true} {
-  make_way(path, if_exists == IfExists::replace);
+    : path_{path},
+      candidates_{info.plan.refinement.candidates},
+      created_{true},
+      replaces_{if_exists == IfExists::replace} {
+  make_way(path, replaces_);
   database_ = std::make_unique<Database>(path, Database::Mode::create);
   try {
     open(info);
@@ -166,6 +169,7 @@ void SweepWriter::begin_part(const PartStart& start) {
                  "VALUES ((SELECT count(*) FROM part), ?, ?, ?)"};
   part.bind(utc_now(), start.dwell, start.tick).run();
   put_on_disk();
+  take_its_place();
 }
 
 void SweepWriter::end_part(const std::string& outcome, const std::string& detail) {
@@ -189,10 +193,22 @@ void SweepWriter::finish() {
     // Somebody reads it, or there is no room: the log beside it is as good.
   }
   spare_->give_back();
+  take_its_place();
+}
+
+void SweepWriter::take_its_place() noexcept {
+  if (std::exchange(replaces_, false)) drop_old(path_);
 }
 
 void SweepWriter::discard() {
-  if (created_) remove_sweep_file(path_);
+  if (!created_) return;
+  statements_.reset();
+  database_.reset();
+  if (replaces_) {
+    put_old_back(path_);
+  } else {
+    remove_sweep_file(path_);
+  }
 }
 
 void SweepWriter::set(const std::string& key, const std::string& value) {
