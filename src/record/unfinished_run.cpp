@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "record/schema.h"
 
@@ -97,15 +99,53 @@ std::set<std::uint32_t> broken_off_dwells(const StoredRun& run) {
   return broken_off;
 }
 
+// The last doubt of the modes that its part of the run did not live to judge.
+std::optional<std::uint64_t> unjudged_doubt(const StoredRun& run) {
+  std::optional<std::uint64_t> unjudged;
+  std::optional<std::uint64_t> doubt;  // of the part at hand
+  for (const StoredEvent& event : run.events) {
+    if (event.kind == to_string(EventKind::started)) {
+      if (doubt) unjudged = std::exchange(doubt, std::nullopt);
+    } else if (event.kind == to_string(EventKind::model_doubted)) {
+      if (event.value == doubt_begins) {
+        doubt = event.tick;
+      } else if (event.value < doubt_begins) {
+        doubt.reset();
+      }
+    }
+  }
+  return doubt ? doubt : unjudged;
+}
+
+// Dwells whose points are those of modes that were doubted afterwards, and nobody knows whether
+// rightly.
+std::set<std::uint32_t> doubted_dwells(const StoredRun& run) {
+  const std::optional<std::uint64_t> doubt = unjudged_doubt(run);
+  if (!doubt) return {};
+  std::set<std::uint32_t> modelled;
+  for (const StoredResponse& response : run.responses) {
+    for (const StoredPoint& point : response.points) {
+      const bool stopped = point.status == to_string(PointStatus::stopped);
+      if (!stopped && point.settled_by == to_string(SettledBy::model)) modelled.insert(point.dwell);
+    }
+  }
+  std::set<std::uint32_t> doubted;
+  for (const StoredTiming& timing : run.timings) {
+    if (timing.first_tick <= *doubt && modelled.contains(timing.dwell))
+      doubted.insert(timing.dwell);
+  }
+  return doubted;
+}
+
 // Finished dwells that were to be measured again and have not been: their timing is older than the
-// sentence, or the new try was broken off.
+// sentence, or the new try was broken off; and those on which no sentence was passed in time.
 std::set<std::uint32_t> condemned_dwells(const StoredRun& run,
                                          const std::set<std::uint32_t>& broken_off) {
   std::map<std::uint32_t, std::uint64_t> sentenced;
   for (const StoredEvent& event : run.events) {
     if (event.kind == to_string(EventKind::condemned)) sentenced[event.dwell] = event.tick;
   }
-  std::set<std::uint32_t> condemned;
+  std::set<std::uint32_t> condemned = doubted_dwells(run);
   for (const StoredTiming& timing : run.timings) {
     const auto found = sentenced.find(timing.dwell);
     if (found != sentenced.end() && timing.first_tick <= found->second)

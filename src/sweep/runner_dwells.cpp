@@ -150,8 +150,15 @@ void SweepRunner::conclude_dwell() noexcept {
     return;
   }
   if (try_again()) return;
-  finish_dwell();
   check_model();
+  // On the disk with the dwell's points: those who go on after a kill have to know.
+  if (trust_.doubted()) {
+    announce({.kind = EventKind::model_doubted,
+              .dwell = dwell_,
+              .tick = last_tick_,
+              .value = doubt_begins});
+  }
+  finish_dwell();
   if (!trust_.doubted()) {
     next_dwell();
     return;

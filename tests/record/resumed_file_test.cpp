@@ -115,6 +115,54 @@ TEST_F(ResumedFile, KnowsWhatIsStillToBeMeasuredAgain) {
   EXPECT_EQ(run.finished.condemned, (std::vector<std::uint32_t>{2, 3}));
 }
 
+// Killed, or stopped, while the modes were looked for once more.
+TEST_F(ResumedFile, CondemnsWhatWasDoubtedAndNotJudged) {
+  const auto condemned = [&] {
+    return read_unfinished(path()).finished.condemned;
+  };
+  const auto doubt = [](std::uint32_t id, std::uint64_t tick, double value) {
+    return Event{.kind = EventKind::model_doubted, .dwell = id, .tick = tick, .value = value};
+  };
+  const auto modelled_dwell = [&](SweepWriter& writer, std::uint32_t id, std::uint64_t first_tick) {
+    Point point = a_point(id);
+    point.settled_by = SettledBy::model;
+    writer.write(point);
+    writer.write(DwellTiming{.dwell = id, .first_tick = first_tick, .ticks = 5000});
+  };
+  {
+    SweepWriter first{path(), an_info(), SweepWriter::IfExists::refuse};
+    first.begin_part({});
+    first.write(Event{.kind = EventKind::started});
+    modelled_dwell(first, 0, 0);
+    dwell(first, 1, 5000);
+    first.write(doubt(1, 9999, doubt_begins));
+    first.commit();
+    EXPECT_EQ(condemned(), std::vector<std::uint32_t>{0});
+    first.write(doubt(1, 11000, 0.0));  // the modes are confirmed
+    first.commit();
+    EXPECT_TRUE(condemned().empty());
+    first.write(doubt(1, 11001, doubt_begins));
+    first.end_part("interrupted", "stop requested");
+    first.finish();
+  }
+  const std::vector<std::uint32_t> doubted = condemned();
+  EXPECT_EQ(doubted, std::vector<std::uint32_t>{0});
+
+  // What another part finds of its own modes is no verdict on those.
+  SweepWriter second{path(), an_info()};
+  second.begin_part(read_unfinished(path()).start);
+  second.write(doubt(2, 0, not_reviewed));
+  second.write(Event{.kind = EventKind::started});
+  modelled_dwell(second, 2, 100);
+  second.write(doubt(2, 5100, doubt_begins));
+  second.write(doubt(2, 5200, 0.0));
+  second.commit();
+  EXPECT_EQ(condemned(), doubted);
+  second.write(Event{.kind = EventKind::remeasured, .dwell = 0, .tick = 6000});
+  dwell(second, 0, 6000);
+  EXPECT_TRUE(condemned().empty());
+}
+
 TEST_F(ResumedFile, KeepsWhatWasFinishedAndReplacesTheStoppedPoint) {
   first_part();
   const auto before = texts("SELECT quote(re) || quote(im) FROM point WHERE dwell < 2");
