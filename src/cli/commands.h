@@ -11,6 +11,8 @@
 
 namespace sinerig::cli {
 
+class ServiceNotifier;
+
 enum ExitCode : int {
   exit_done = 0,
   exit_failed = 1,
@@ -42,6 +44,7 @@ struct ResumeOptions {
   bool table = true;  // print the points at the end
   Voice voice = Voice::text;
   std::optional<std::string> serve = {};  // as RunOptions::serve
+  ServiceNotifier* service = nullptr;     // of a night that goes on behind it
 };
 
 struct NightOptions {

@@ -1,7 +1,9 @@
 #include "cli/night_command.h"
 
 #include <algorithm>
+#include <chrono>
 #include <ctime>
+#include <filesystem>
 #include <iostream>
 #include <map>
 #include <sstream>
@@ -12,6 +14,7 @@
 #include "cli/night_folder.h"
 #include "cli/output_file.h"
 #include "cli/recorded_run.h"
+#include "cli/service_notifier.h"
 #include "cli/stop_on_signal.h"
 #include "report/night_summary.h"
 
@@ -19,12 +22,20 @@ namespace sinerig::cli {
 
 namespace {
 
+namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 std::unique_ptr<ConfiguredRig> configured_rig(const NightTask& task,
                                               const std::vector<DriverKit>& drivers) {
   return std::make_unique<ConfiguredRig>(config::RigFile::parse(task.rig_text, task.sweep->rig),
                                          drivers);
+}
+
+// What is there may be a run that was killed as it began: that is in the way.
+record::SweepWriter::IfExists if_exists(const NightTask& task) {
+  const bool in_the_way = fs::exists(task.sweep_file) && !record::is_begun(task.sweep_file);
+  return in_the_way ? record::SweepWriter::IfExists::replace
+                    : record::SweepWriter::IfExists::refuse;
 }
 
 void print_line(const ordered_json& json) {
@@ -50,6 +61,7 @@ class Night {
 
  private:
   bool wait_for(const NightTask& task, const NightFolder& folder);
+  int attend(const NightTask& task, std::size_t number, const NightFolder& folder);
   int sweep(const NightTask& task, TaskState state);
   int conclude(const NightFolder& folder, int code);
   void tell(const NightTask& task, TaskState state, std::size_t number) const;
@@ -59,7 +71,8 @@ class Night {
   WallTime& time_;
   NightJob job_;
   std::vector<NightTask> tasks_;
-  RunControl between_;                           // a stop between sweeps
+  ServiceNotifier service_;
+  RunControl between_;                           // a stop, whenever it was asked for
   std::map<std::string, std::string> failures_;  // by sweep file: could not be run at all
 };
 
@@ -73,10 +86,14 @@ bool Night::wait_for(const NightTask& task, const NightFolder& folder) {
   if (task.repeat == 1 && sweep.start_after_s) {
     until_s = std::max(until_s, folder.began_s() + static_cast<std::int64_t>(*sweep.start_after_s));
   }
-  if (until_s > time_.now_s() && options_.voice == Voice::text) {
-    spdlog::info("waiting until {} for {}-{}", local_time_text(until_s), sweep.name, task.repeat);
+  if (until_s > time_.now_s()) {
+    const std::string what = "waiting until " + local_time_text(until_s) + " for " + sweep.name +
+                             "-" + std::to_string(task.repeat);
+    if (options_.voice == Voice::text) spdlog::info(what);
+    service_.status(what);
   }
-  return time_.wait_until(until_s, between_.stop_requests);
+  return time_.wait_until(until_s, between_.stop_requests,
+                          [this] { service_.idle(std::chrono::steady_clock::now()); });
 }
 
 void Night::tell(const NightTask& task, TaskState state, std::size_t number) const {
@@ -97,58 +114,63 @@ void Night::tell(const NightTask& task, TaskState state, std::size_t number) con
 
 int Night::sweep(const NightTask& task, TaskState state) {
   if (state != TaskState::not_begun) {
-    return resume_command({.file = task.sweep_file, .table = false, .voice = options_.voice},
-                          drivers_);
+    return resume_command(
+        {.file = task.sweep_file, .table = false, .voice = options_.voice, .service = &service_},
+        drivers_);
   }
   const std::unique_ptr<ConfiguredRig> configured = configured_rig(task, drivers_);
   const SweepPlan plan = configured->rig().plan();
-  // What is there has no plan in it: a run that was killed as it began.
   return record_run(*configured, plan,
-                    {.sweep_file = task.sweep_file, .voice = options_.voice, .table = false}, [&] {
+                    {.sweep_file = task.sweep_file,
+                     .voice = options_.voice,
+                     .table = false,
+                     .service = &service_},
+                    [&] {
                       return std::make_unique<record::SweepWriter>(
-                          task.sweep_file, run_info(configured->rig(), plan),
-                          record::SweepWriter::IfExists::replace);
+                          task.sweep_file, run_info(configured->rig(), plan), if_exists(task));
                     });
+}
+
+// Runs what is left of a task; the exit code of a run.
+int Night::attend(const NightTask& task, std::size_t number, const NightFolder& folder) {
+  const TaskState state = state_of(task);
+  if (state == TaskState::done) return exit_done;
+  if (state == TaskState::stopped && !job_.stop_on_stop) return exit_stopped;  // it had its chance
+  if (state == TaskState::not_begun && !wait_for(task, folder)) return exit_interrupted;
+  if (between_.stop_requests.load() > 0) return exit_interrupted;
+  tell(task, state, number);
+  const int ended = sweep(task, state);
+  const record::StoredRun run = record::read_sweep(task.sweep_file);
+  std::uint64_t ticks = 0;
+  for (const record::StoredTiming& timing : run.timings) ticks += timing.ticks + timing.skipped;
+  time_.pass(static_cast<double>(ticks) / run.plan.rate_hz);
+  return ended;
 }
 
 int Night::run() {
   const StopOnSignal stop_on_signal{between_};
   const NightFolder folder{job_, time_};
+  service_.ready();
   int code = exit_done;
   std::size_t number = 0;
   for (const NightTask& task : tasks_) {
-    ++number;
-    const TaskState state = state_of(task);
-    const bool leave = state == TaskState::stopped && !job_.stop_on_stop;
-    if (leave) code = exit_stopped;
-    if (state == TaskState::done || leave) continue;
-    if (state == TaskState::not_begun && !wait_for(task, folder)) {
-      return conclude(folder, exit_interrupted);
-    }
-    tell(task, state, number);
     int ended = exit_stopped;
     try {
-      ended = sweep(task, state);
+      ended = attend(task, ++number, folder);
     } catch (const std::exception& error) {
       spdlog::error("{}", error.what());
       failures_[task.sweep_file] = error.what();
     }
-    if (ended == exit_interrupted || between_.stop_requests.load() > 0) {
-      return conclude(folder, exit_interrupted);
-    }
-    if (ended != exit_done) code = exit_stopped;
-    if (ended != exit_done && job_.stop_on_stop) break;
-    if (!failures_.contains(task.sweep_file)) {
-      const record::StoredRun run = record::read_sweep(task.sweep_file);
-      std::uint64_t ticks = 0;
-      for (const record::StoredTiming& timing : run.timings) ticks += timing.ticks + timing.skipped;
-      time_.pass(static_cast<double>(ticks) / run.plan.rate_hz);
-    }
+    if (ended == exit_interrupted) return conclude(folder, exit_interrupted);
+    if (ended == exit_done) continue;
+    code = exit_stopped;
+    if (job_.stop_on_stop) break;
   }
   return conclude(folder, code);
 }
 
 int Night::conclude(const NightFolder& folder, int code) {
+  service_.stopping();
   std::vector<report::NightRow> rows = night_rows(job_, tasks_);
   bool changed = false;
   for (report::NightRow& row : rows) {

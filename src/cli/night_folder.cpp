@@ -49,14 +49,6 @@ std::int64_t read_beginning(const std::string& path) {
   throw record::SweepFileError(path + ": does not say when the night began; is it another file?");
 }
 
-bool is_begun(const std::string& path) {
-  try {
-    return !record::read_sweep(path).plan.dwells.empty();
-  } catch (const record::SweepFileError&) {
-    return false;  // killed before the plan was on the disk
-  }
-}
-
 }  // namespace
 
 NightFolder::NightFolder(const NightJob& job, WallTime& time) : folder_{job.folder} {
@@ -81,7 +73,9 @@ std::string NightFolder::path(const std::string& name) const {
 }
 
 TaskState state_of(const NightTask& task) {
-  if (!fs::exists(task.sweep_file) || !is_begun(task.sweep_file)) return TaskState::not_begun;
+  if (!fs::exists(task.sweep_file) || !record::is_begun(task.sweep_file)) {
+    return TaskState::not_begun;
+  }
   const record::StoredRun run = record::read_sweep(task.sweep_file);
   if (run.fact("rig_text") != task.rig_text) {
     throw config::ConfigError(
@@ -92,6 +86,36 @@ TaskState state_of(const NightTask& task) {
   if (outcome == "done") return TaskState::done;
   return outcome == "stopped" ? TaskState::stopped : TaskState::unfinished;
 }
+
+namespace {
+
+// What the sweep file says; `first` is the first repeat that has points, with which it is compared.
+void read_row(const NightTask& task, const NightJob& job, std::vector<report::LabelledRun>& first,
+              report::NightRow& row) {
+  if (state_of(task) == TaskState::not_begun) return;
+  report::LabelledRun run{.label = fs::path{task.sweep_file}.stem().string(),
+                          .run = record::read_sweep(task.sweep_file)};
+  row.started_utc = run.run.fact("started_utc");
+  row.outcome = run.run.fact("outcome").empty() ? "not finished" : run.run.fact("outcome");
+  row.detail = run.run.fact("outcome_detail");
+  row.parts = run.run.parts.size();
+  for (const record::StoredTiming& timing : run.run.timings) {
+    row.bench_s += static_cast<double>(timing.ticks + timing.skipped) / run.run.plan.rate_hz;
+  }
+  for (const record::StoredResponse& response : run.run.responses) {
+    for (const record::StoredPoint& point : response.points) {
+      ++row.points;
+      if (point.status == "good") ++row.good;
+    }
+  }
+  if (first.empty() && row.points > 0) {
+    first.push_back(std::move(run));
+  } else if (row.points > 0) {
+    row.differences = differences_of({first.front(), std::move(run)}, job.compare);
+  }
+}
+
+}  // namespace
 
 std::vector<report::NightRow> night_rows(const NightJob& job, const std::vector<NightTask>& tasks) {
   std::vector<report::NightRow> rows;
@@ -105,27 +129,11 @@ std::vector<report::NightRow> night_rows(const NightJob& job, const std::vector<
                          .detail = {},
                          .started_utc = {},
                          .differences = {}};
-    if (state_of(task) != TaskState::not_begun) {
-      report::LabelledRun run{.label = fs::path{task.sweep_file}.stem().string(),
-                              .run = record::read_sweep(task.sweep_file)};
-      row.started_utc = run.run.fact("started_utc");
-      row.outcome = run.run.fact("outcome").empty() ? "not finished" : run.run.fact("outcome");
-      row.detail = run.run.fact("outcome_detail");
-      row.parts = run.run.parts.size();
-      for (const record::StoredTiming& timing : run.run.timings) {
-        row.bench_s += static_cast<double>(timing.ticks + timing.skipped) / run.run.plan.rate_hz;
-      }
-      for (const record::StoredResponse& response : run.run.responses) {
-        for (const record::StoredPoint& point : response.points) {
-          ++row.points;
-          if (point.status == "good") ++row.good;
-        }
-      }
-      if (first.empty() && row.points > 0) {
-        first.push_back(std::move(run));
-      } else if (row.points > 0) {
-        row.differences = differences_of({first.front(), std::move(run)}, job.compare);
-      }
+    try {
+      read_row(task, job, first, row);
+    } catch (const record::SweepFileError& error) {
+      row.outcome = "failed";
+      row.detail = error.what();
     }
     rows.push_back(std::move(row));
   }

@@ -32,10 +32,10 @@ class NightFolder {
 enum class TaskState { not_begun, unfinished, stopped, done };
 
 // Where a task stands by its sweep file. Throws config::ConfigError where that was made from
-// another rig file.
+// another rig file, record::SweepFileError where it cannot be read.
 TaskState state_of(const NightTask& task);
 
-// One row per task, compared where there are points.
+// One row per task, compared where there are points. A file that cannot be read is a row, too.
 std::vector<report::NightRow> night_rows(const NightJob& job, const std::vector<NightTask>& tasks);
 
 }  // namespace sinerig::cli

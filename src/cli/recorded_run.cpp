@@ -1,5 +1,6 @@
 #include "cli/recorded_run.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <mutex>
@@ -197,6 +198,18 @@ std::optional<KnownModes> earlier_modes(const config::Rig& rig) {
   return modes_of_file(rig.prior, outputs);
 }
 
+// Whether points that an earlier part has modelled are left without the review that ends such a
+// sweep: with no dwell of the plan to come the modes, which that part had found, are not looked
+// for.
+bool without_review(const SweepPlan& plan, const SweepRunner& runner,
+                    const FinishedDwells& finished) {
+  const auto modelled = [](const Point& point) {
+    return point.settled_by == SettledBy::model && point.status != PointStatus::stopped;
+  };
+  return plan.judgement.settling == Settling::model && finished.dwells == runner.dwells().size() &&
+         std::any_of(finished.points.begin(), finished.points.end(), modelled);
+}
+
 }  // namespace
 
 record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan) {
@@ -219,6 +232,8 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
   const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   RunControl control;
   const StopOnSignal stop_on_signal{control};
+  std::optional<ServiceNotifier> own_service;
+  ServiceNotifier& service = options.service != nullptr ? *options.service : own_service.emplace();
   RunTeller teller{options.voice, options.table, rig, plan};
   const std::unique_ptr<LiveView> view =
       options.serve ? std::make_unique<LiveView>(*options.serve, rig, plan, clock, control)
@@ -253,11 +268,19 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
     }
     if (to_measure) configured.arm();
     writer->begin_part(earlier != nullptr ? earlier->start : record::PartStart{});
+    if (earlier != nullptr && !modes && without_review(plan, *runner, earlier->finished)) {
+      writer->write(Event{.kind = EventKind::model_doubted,
+                          .dwell = earlier->finished.dwells,
+                          .value = not_reviewed});
+      spdlog::warn(
+          "{}: its modelled points are not held against a model of the whole sweep any more: the "
+          "modes were lost with the interruption",
+          writer->path());
+    }
   } catch (...) {
     writer->discard();
     throw;
   }
-  ServiceNotifier service;
   Played played;
   if (to_measure) {
     const bool keep_samples = rig.runner.record_samples || !view;
@@ -270,7 +293,11 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
                    .tick_s = in_real_time ? clock.grid().period_s() : 0.0});
   }
 
-  service.stopping();
+  if (own_service) {
+    service.stopping();
+  } else {
+    service.idle(std::chrono::steady_clock::now());
+  }
   RunEnd end{.outcome = played.disk_failure.empty() ? outcome_name(played.outcome) : "stopped",
              .reason = reason_of(played, outbox, configured),
              .sweep_file = writer->path(),

@@ -20,6 +20,7 @@ struct RecordedRunOptions {
   bool report = true;                  // write NAME.html at the end
   bool table = true;                   // print the points at the end
   std::optional<std::string> serve{};  // as RunOptions::serve
+  ServiceNotifier* service = nullptr;  // of a night that goes on behind it; else it has its own
 };
 
 // What a sweep file says of a rig before the first tick.

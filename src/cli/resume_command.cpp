@@ -60,7 +60,8 @@ int resume_command(const ResumeOptions& options, const std::vector<DriverKit>& d
        .voice = options.voice,
        .report = options.report,
        .table = options.table,
-       .serve = options.serve},
+       .serve = options.serve,
+       .service = options.service},
       [&] {
         return std::make_unique<record::SweepWriter>(options.file,
                                                      run_info(configured.rig(), plan));

@@ -57,7 +57,7 @@ void ServiceNotifier::send(const std::string& message) {
 }
 
 void ServiceNotifier::ready() {
-  send("READY=1");
+  if (!std::exchange(ready_, true)) send("READY=1");
 }
 
 void ServiceNotifier::status(const std::string& text) {
@@ -69,6 +69,13 @@ void ServiceNotifier::status(const std::string& text) {
 void ServiceNotifier::progress(std::uint64_t tick, Time now) {
   if (watchdog_.count() <= 0 || tick == fed_at_ || now < next_) return;
   fed_at_ = tick;
+  next_ = now + watchdog_ / 4;
+  send("WATCHDOG=1");
+}
+
+void ServiceNotifier::idle(Time now) {
+  fed_at_ = UINT64_MAX;  // the ticks of the next loop begin anew
+  if (watchdog_.count() <= 0 || now < next_) return;
   next_ = now + watchdog_ / 4;
   send("WATCHDOG=1");
 }

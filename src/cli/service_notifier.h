@@ -22,6 +22,7 @@ class ServiceNotifier {
   ServiceNotifier(const ServiceNotifier&) = delete;
   ServiceNotifier& operator=(const ServiceNotifier&) = delete;
 
+  // Told once.
   void ready();
   void status(const std::string& text);
 
@@ -29,7 +30,10 @@ class ServiceNotifier {
   // times in its period at most: a loop that stands still starves it, whoever else is alive.
   void progress(std::uint64_t tick, Time now);
 
-  // The loop has ended, what is left is writing files.
+  // No loop is to run now, between the sweeps of a night: the watchdog is fed by time.
+  void idle(Time now);
+
+  // The last loop has ended, what is left is writing files.
   void stopping();
 
  private:
@@ -38,6 +42,7 @@ class ServiceNotifier {
   std::string socket_;
   std::chrono::microseconds watchdog_;
   int descriptor_ = -1;
+  bool ready_ = false;
   std::string status_;
   std::uint64_t fed_at_ = UINT64_MAX;
   Time next_{};

@@ -6,17 +6,25 @@ namespace sinerig::cli {
 
 namespace {
 
-// Set by the signal handler's owner, read in the handler.
-std::atomic<RunControl*> running{nullptr};
+// Set by the signal handler's owners, read in the handler.
+std::atomic<StopOnSignal*> innermost{nullptr};
 
-void count_stop_request(int /*signal*/) {
-  if (RunControl* control = running.load()) control->stop_requests.fetch_add(1);
+void raise_to(std::atomic<int>& count, int least) {
+  int now = count.load();
+  while (now < least && !count.compare_exchange_weak(now, least)) {
+  }
 }
 
 }  // namespace
 
-StopOnSignal::StopOnSignal(RunControl& control) {
-  outer_ = running.exchange(&control);
+void StopOnSignal::count_stop_request(int /*signal*/) {
+  for (const StopOnSignal* each = innermost.load(); each != nullptr; each = each->outer_) {
+    each->control_.stop_requests.fetch_add(1);
+  }
+}
+
+StopOnSignal::StopOnSignal(RunControl& control) : control_{control}, outer_{innermost.load()} {
+  innermost = this;
   struct sigaction action {};
   action.sa_handler = count_stop_request;
   sigaction(SIGINT, &action, &old_int_);
@@ -24,6 +32,9 @@ StopOnSignal::StopOnSignal(RunControl& control) {
   sigaction(SIGHUP, &action, &old_hup_);
   action.sa_handler = SIG_IGN;
   sigaction(SIGPIPE, &action, &old_pipe_);
+  if (outer_ != nullptr) {
+    raise_to(control.stop_requests, outer_->control_.stop_requests.load());
+  }
 }
 
 StopOnSignal::~StopOnSignal() {
@@ -31,7 +42,7 @@ StopOnSignal::~StopOnSignal() {
   sigaction(SIGTERM, &old_term_, nullptr);
   sigaction(SIGHUP, &old_hup_, nullptr);
   sigaction(SIGPIPE, &old_pipe_, nullptr);
-  running = outer_;
+  innermost = outer_;
 }
 
 }  // namespace sinerig::cli

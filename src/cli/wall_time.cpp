@@ -9,7 +9,8 @@ namespace sinerig::cli {
 
 namespace {
 
-constexpr std::chrono::milliseconds look_interval{200};
+// As often as a run tells how it goes.
+constexpr std::chrono::milliseconds look_interval{50};
 
 std::string formatted(const std::tm& parts, const char* format) {
   char text[40];
@@ -23,12 +24,18 @@ std::int64_t SystemTime::now_s() {
   return std::time(nullptr);
 }
 
-bool SystemTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) {
-  while (stop_requests.load() == 0 && now_s() < time_s) std::this_thread::sleep_for(look_interval);
+bool SystemTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
+                            const std::function<void()>& meanwhile) {
+  while (stop_requests.load() == 0 && now_s() < time_s) {
+    meanwhile();
+    std::this_thread::sleep_for(look_interval);
+  }
   return stop_requests.load() == 0;
 }
 
-bool PassingTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) {
+bool PassingTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
+                             const std::function<void()>& meanwhile) {
+  meanwhile();
   now_s_ = std::max(now_s_, time_s);
   return stop_requests.load() == 0;
 }

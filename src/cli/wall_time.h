@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 namespace sinerig::cli {
@@ -14,18 +15,20 @@ class WallTime {
   // Seconds since 1970, UTC.
   virtual std::int64_t now_s() = 0;
 
-  // False where `stop_requests` rose before.
-  virtual bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) = 0;
+  // False where `stop_requests` rose before. `meanwhile` is called now and then.
+  virtual bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
+                          const std::function<void()>& meanwhile) = 0;
 
   // A sweep has taken this much bench time.
   virtual void pass(double seconds) = 0;
 };
 
-// Steps of the clock and a machine that slept are seen within a fifth of a second.
+// Steps of the clock and a machine that slept are seen at once.
 class SystemTime final : public WallTime {
  public:
   std::int64_t now_s() override;
-  bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) override;
+  bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
+                  const std::function<void()>& meanwhile) override;
   void pass(double) override {}
 };
 
@@ -34,7 +37,8 @@ class PassingTime final : public WallTime {
  public:
   explicit PassingTime(std::int64_t start_s) : now_s_{start_s} {}
   std::int64_t now_s() override { return now_s_; }
-  bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) override;
+  bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
+                  const std::function<void()>& meanwhile) override;
   void pass(double seconds) override { now_s_ += static_cast<std::int64_t>(seconds); }
 
  private:

@@ -19,6 +19,46 @@ void refuse_in_use(const std::string& path) {
   }
 }
 
+constexpr const char* old = "-old";
+
+// With the log in which a killed run may have its last points.
+std::error_code move_sweep_file(const std::string& from, const std::string& to) noexcept {
+  remove_sweep_file(to);
+  std::error_code error;
+  for (const char* suffix : {"-wal", "-journal", ""}) {
+    if (std::filesystem::exists(from + suffix, error)) {
+      std::filesystem::rename(from + suffix, to + suffix, error);
+    }
+    if (error) break;
+  }
+  if (!error) remove_sweep_file(from);
+  return error;
+}
+
+// Of a run that was killed before it had taken the place of another. What cannot be read may be
+// worth something.
+bool without_a_part(const std::string& path) {
+  try {
+    if (!is_begun(path)) return true;
+    Database database{path, Database::Mode::read};
+    Statement parts{database, "SELECT 1 FROM part"};
+    return !parts.step();
+  } catch (const SweepFileError&) {
+    return false;
+  }
+}
+
+void set_aside(const std::string& path) {
+  // The one that was to be replaced then is the one that is to be replaced now.
+  if (std::filesystem::exists(path + old) && without_a_part(path)) {
+    remove_sweep_file(path);
+    return;
+  }
+  if (const std::error_code error = move_sweep_file(path, path + old)) {
+    throw SweepFileError(path + ": cannot be set aside: " + error.message());
+  }
+}
+
 }  // namespace
 
 void remove_sweep_file(const std::string& path) noexcept {
@@ -26,6 +66,16 @@ void remove_sweep_file(const std::string& path) noexcept {
   for (const char* suffix : {"", "-wal", "-shm", "-journal", "-spare"}) {
     std::filesystem::remove(path + suffix, not_there);
   }
+}
+
+void drop_old(const std::string& path) noexcept {
+  remove_sweep_file(path + old);
+}
+
+void put_old_back(const std::string& path) noexcept {
+  remove_sweep_file(path);
+  std::error_code error;
+  if (std::filesystem::exists(path + old, error)) move_sweep_file(path + old, path);
 }
 
 void make_way(const std::string& path, bool replace) {
@@ -44,7 +94,7 @@ void make_way(const std::string& path, bool replace) {
                      "; choose another name with -o, or --force to replace it");
   }
   const FileLock nobody_writes{path, file_in_use};
-  remove_sweep_file(path);
+  set_aside(path);
 }
 
 }  // namespace sinerig::record

@@ -6,8 +6,16 @@
 namespace sinerig::record {
 
 // Makes the path free for a new file. Throws FileExists where there is one that is not to be
-// replaced, saying whether it can be resumed; FileInUse where one is being written.
+// replaced, saying whether it can be resumed; FileInUse where one is being written. One that is to
+// be replaced is set aside, as NAME.sweep-old, until either of the two below.
 void make_way(const std::string& path, bool replace);
+
+// The new file has taken the place of the old one for good.
+void drop_old(const std::string& path) noexcept;
+
+// The new file came to nothing: the old one stands where it stood. No database may be open on
+// either, it would take the log of the other for its own.
+void put_old_back(const std::string& path) noexcept;
 
 // The file with what SQLite and SpareRoom may have left beside it.
 void remove_sweep_file(const std::string& path) noexcept;

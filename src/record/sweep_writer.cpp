@@ -71,8 +71,11 @@ struct SweepWriter::Statements {
 };
 
 SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists if_exists)
-    : path_{path}, candidates_{info.plan.refinement.candidates}, created_{true} {
-  make_way(path, if_exists == IfExists::replace);
+    : path_{path},
+      candidates_{info.plan.refinement.candidates},
+      created_{true},
+      replaces_{if_exists == IfExists::replace} {
+  make_way(path, replaces_);
   database_ = std::make_unique<Database>(path, Database::Mode::create);
   try {
     open(info);
@@ -148,6 +151,14 @@ void SweepWriter::commit() {
 
 void SweepWriter::begin_part(const PartStart& start) {
   start_ = start;
+  attempts_.clear();
+  Statement earlier{*database_,
+                    "SELECT dwell, 1 + max(attempt) FROM (SELECT dwell, attempt FROM block "
+                    "UNION ALL SELECT dwell, attempt FROM lesson) GROUP BY dwell"};
+  while (earlier.step()) {
+    attempts_[static_cast<std::uint32_t>(earlier.integer(0))] =
+        static_cast<std::uint32_t>(earlier.integer(1));
+  }
   begin();
   database_->execute(
       "UPDATE part SET outcome = 'killed' WHERE outcome IS NULL;"
@@ -158,6 +169,7 @@ void SweepWriter::begin_part(const PartStart& start) {
                  "VALUES ((SELECT count(*) FROM part), ?, ?, ?)"};
   part.bind(utc_now(), start.dwell, start.tick).run();
   put_on_disk();
+  take_its_place();
 }
 
 void SweepWriter::end_part(const std::string& outcome, const std::string& detail) {
@@ -181,10 +193,22 @@ void SweepWriter::finish() {
     // Somebody reads it, or there is no room: the log beside it is as good.
   }
   spare_->give_back();
+  take_its_place();
+}
+
+void SweepWriter::take_its_place() noexcept {
+  if (std::exchange(replaces_, false)) drop_old(path_);
 }
 
 void SweepWriter::discard() {
-  if (created_) remove_sweep_file(path_);
+  if (!created_) return;
+  statements_.reset();
+  database_.reset();
+  if (replaces_) {
+    put_old_back(path_);
+  } else {
+    remove_sweep_file(path_);
+  }
 }
 
 void SweepWriter::set(const std::string& key, const std::string& value) {
@@ -276,6 +300,7 @@ void SweepWriter::insert(const Event& event) {
   if (event.kind == EventKind::remeasured) {
     // What follows stands in place of what was.
     Statement{*database_, "DELETE FROM block WHERE dwell = ?"}.bind(event.dwell).run();
+    attempts_.erase(event.dwell);
   }
   if (event.kind == EventKind::refined) write_dwell(event.dwell, candidates_.at(event.candidate));
   Trip trip = event.trip;
@@ -318,7 +343,8 @@ void SweepWriter::insert(const Lesson& lesson) {
 
 // What was begun before the interruption keeps its rows.
 std::uint32_t SweepWriter::attempt_of(std::uint32_t dwell, std::uint32_t attempt) const {
-  return dwell == start_.dwell ? start_.attempt + attempt : attempt;
+  const auto earlier = attempts_.find(dwell);
+  return earlier == attempts_.end() ? attempt : earlier->second + attempt;
 }
 
 }  // namespace sinerig::record

@@ -1,6 +1,7 @@
 // Writes NAME.sweep, one SQLite database that holds everything about one run.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -31,8 +32,7 @@ struct RunInfo {
 // Where a part of a run begins.
 struct PartStart {
   std::uint32_t dwell = 0;
-  std::uint64_t tick = 0;     // of the file, for the part's own tick 0
-  std::uint32_t attempt = 0;  // of that dwell, for the part's own first
+  std::uint64_t tick = 0;  // of the file, for the part's own tick 0
 };
 
 class SweepWriter {
@@ -40,7 +40,8 @@ class SweepWriter {
   enum class IfExists { refuse, replace };
 
   // Creates the file with the plan in it. Throws SweepFileError; an existing file is left alone
-  // unless it is to be replaced, and one that is being written in any case.
+  // unless it is to be replaced, and one that is being written in any case. What is to be replaced
+  // is gone with begin_part().
   SweepWriter(const std::string& path, const RunInfo& info, IfExists if_exists);
 
   // Opens the file of an interrupted run; it stays as it is until begin_part(). Throws FileInUse
@@ -71,8 +72,8 @@ class SweepWriter {
   void end_part(const std::string& outcome, const std::string& detail);
   void finish();
 
-  // The run never began: removes the file that it was created for, leaves one that it was opened
-  // for.
+  // The run never began: removes the file that it was created for, puts back what that was to
+  // replace, leaves one that it was opened for. The last that this is asked for.
   void discard();
 
   // A fact about the whole run.
@@ -84,6 +85,7 @@ class SweepWriter {
   void open(const RunInfo& info);
   void begin();
   void put_on_disk();
+  void take_its_place() noexcept;
   void write_head(const RunInfo& info);
   void write_dwell(std::size_t index, const Dwell& dwell);
   void insert(const Point& point);
@@ -101,11 +103,13 @@ class SweepWriter {
   std::vector<std::string> sensor_names_;
   std::vector<Dwell> candidates_;   // of the plan's refinement
   bool created_;                    // not resumed
+  bool replaces_ = false;           // an earlier file, set aside meanwhile
   std::unique_ptr<FileLock> lock_;  // outlives the database
   std::unique_ptr<SpareRoom> spare_;
   std::unique_ptr<Database> database_;
   std::unique_ptr<Statements> statements_;
   PartStart start_;
+  std::map<std::uint32_t, std::uint32_t> attempts_;  // by dwell: those of earlier parts
   std::vector<Record> pending_;  // since the last commit, but blocks and samples
   bool dwell_half_written_ = false;
 };

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 #include <tuple>
+#include <utility>
 
 #include "record/schema.h"
 
@@ -20,10 +22,8 @@ Tables tables_of(Database& database) {
   return tables;
 }
 
-// A run that was killed before its plan was on the disk leaves a database with nothing in it.
 void refuse_not_begun(const std::string& path) {
-  Database database{path, Database::Mode::read};
-  if (!tables_of(database).empty()) return;
+  if (is_begun(path)) return;
   throw SweepFileError(path +
                        ": is not a sweep file, or one whose run was killed before it began: "
                        "there is nothing to resume");
@@ -41,23 +41,28 @@ void refuse_other_layout(const std::string& path, Database& database) {
   }
 }
 
+// What to_string() has a name for; behind the last value it has none.
 template <typename Enum>
-Enum named(const std::string& name, Enum last) {
-  for (std::uint8_t i = 0; i < static_cast<std::uint8_t>(last); ++i) {
-    if (name == to_string(static_cast<Enum>(i))) return static_cast<Enum>(i);
+Enum named(const std::string& name, const std::string& path) {
+  const std::string none = to_string(static_cast<Enum>(UINT8_MAX));
+  for (std::uint8_t i = 0;; ++i) {
+    const std::string each = to_string(static_cast<Enum>(i));
+    if (each == none) break;
+    if (each == name) return static_cast<Enum>(i);
   }
-  return last;
+  throw SweepFileError(path + ": was begun by another version of sinerig, which says `" + name +
+                       "` of a point; resume it with that version");
 }
 
-Point point_of(const StoredPoint& stored, std::size_t pair) {
+Point point_of(const StoredPoint& stored, std::size_t pair, const std::string& path) {
   return {.dwell = stored.dwell,
           .tone = static_cast<std::uint16_t>(stored.tone),
           .pair = static_cast<std::uint16_t>(pair),
           .input = static_cast<std::uint16_t>(stored.input),
           .output = static_cast<std::uint16_t>(stored.output),
-          .status = named(stored.status, PointStatus::stopped),
-          .reason = named(stored.reason, PointReason::guard_trip),
-          .settled_by = named(stored.settled_by, SettledBy::both),
+          .status = named<PointStatus>(stored.status, path),
+          .reason = named<PointReason>(stored.reason, path),
+          .settled_by = named<SettledBy>(stored.settled_by, path),
           .reason_value = stored.reason_value,
           .frequency_hz = stored.frequency_hz,
           .response = stored.response,
@@ -75,47 +80,100 @@ Point point_of(const StoredPoint& stored, std::size_t pair) {
           .seconds = stored.seconds};
 }
 
+// Dwells in which the sweep has ended, before their measurement had. One that a soft limit has
+// given up is none of them: the sweep went on behind it.
+std::set<std::uint32_t> broken_off_dwells(const StoredRun& run) {
+  std::set<std::uint32_t> tripped;
+  for (const StoredEvent& event : run.events) {
+    if (event.kind == to_string(EventKind::tripped)) tripped.insert(event.dwell);
+    if (event.kind == to_string(EventKind::limited)) tripped.erase(event.dwell);
+  }
+  std::set<std::uint32_t> broken_off;
+  for (const StoredResponse& response : run.responses) {
+    for (const StoredPoint& point : response.points) {
+      if (point.status != to_string(PointStatus::stopped)) continue;
+      const bool by_soft_limit = point.reason == to_string(PointReason::soft_limit);
+      if (!by_soft_limit || tripped.contains(point.dwell)) broken_off.insert(point.dwell);
+    }
+  }
+  return broken_off;
+}
+
+// The last doubt of the modes that its part of the run did not live to judge.
+std::optional<std::uint64_t> unjudged_doubt(const StoredRun& run) {
+  std::optional<std::uint64_t> unjudged;
+  std::optional<std::uint64_t> doubt;  // of the part at hand
+  for (const StoredEvent& event : run.events) {
+    if (event.kind == to_string(EventKind::started)) {
+      if (doubt) unjudged = std::exchange(doubt, std::nullopt);
+    } else if (event.kind == to_string(EventKind::model_doubted)) {
+      if (event.value == doubt_begins) {
+        doubt = event.tick;
+      } else if (event.value < doubt_begins) {
+        doubt.reset();
+      }
+    }
+  }
+  return doubt ? doubt : unjudged;
+}
+
+// Dwells whose points are those of modes that were doubted afterwards, and nobody knows whether
+// rightly.
+std::set<std::uint32_t> doubted_dwells(const StoredRun& run) {
+  const std::optional<std::uint64_t> doubt = unjudged_doubt(run);
+  if (!doubt) return {};
+  std::set<std::uint32_t> modelled;
+  for (const StoredResponse& response : run.responses) {
+    for (const StoredPoint& point : response.points) {
+      const bool stopped = point.status == to_string(PointStatus::stopped);
+      if (!stopped && point.settled_by == to_string(SettledBy::model)) modelled.insert(point.dwell);
+    }
+  }
+  std::set<std::uint32_t> doubted;
+  for (const StoredTiming& timing : run.timings) {
+    if (timing.first_tick <= *doubt && modelled.contains(timing.dwell))
+      doubted.insert(timing.dwell);
+  }
+  return doubted;
+}
+
 // Finished dwells that were to be measured again and have not been: their timing is older than the
-// sentence, or the new try was stopped.
-std::set<std::uint32_t> condemned_dwells(const StoredRun& run) {
+// sentence, or the new try was broken off; and those on which no sentence was passed in time.
+std::set<std::uint32_t> condemned_dwells(const StoredRun& run,
+                                         const std::set<std::uint32_t>& broken_off) {
   std::map<std::uint32_t, std::uint64_t> sentenced;
   for (const StoredEvent& event : run.events) {
     if (event.kind == to_string(EventKind::condemned)) sentenced[event.dwell] = event.tick;
   }
-  std::set<std::uint32_t> condemned;
+  std::set<std::uint32_t> condemned = doubted_dwells(run);
   for (const StoredTiming& timing : run.timings) {
     const auto found = sentenced.find(timing.dwell);
     if (found != sentenced.end() && timing.first_tick <= found->second)
       condemned.insert(timing.dwell);
   }
-  for (const StoredResponse& response : run.responses) {
-    for (const StoredPoint& point : response.points) {
-      if (point.status == to_string(PointStatus::stopped) && sentenced.contains(point.dwell))
-        condemned.insert(point.dwell);
-    }
+  for (const std::uint32_t dwell : broken_off) {
+    if (sentenced.contains(dwell)) condemned.insert(dwell);
   }
   return condemned;
 }
 
-std::uint32_t finished_dwells(const StoredRun& run, const std::set<std::uint32_t>& condemned) {
+std::uint32_t finished_dwells(const StoredRun& run, const std::set<std::uint32_t>& broken_off,
+                              const std::set<std::uint32_t>& condemned) {
   std::set<std::uint32_t> ended;
   for (const StoredTiming& timing : run.timings) ended.insert(timing.dwell);
-  for (const StoredResponse& response : run.responses) {
-    for (const StoredPoint& point : response.points) {
-      const bool stopped = point.status == to_string(PointStatus::stopped);
-      if (stopped && !condemned.contains(point.dwell)) ended.erase(point.dwell);
-    }
+  for (const std::uint32_t dwell : broken_off) {
+    if (!condemned.contains(dwell)) ended.erase(dwell);
   }
   std::uint32_t finished = 0;
   while (ended.contains(finished)) ++finished;
   return finished;
 }
 
-std::vector<Point> points_of(const StoredRun& run, std::uint32_t dwells) {
+std::vector<Point> points_of(const StoredRun& run, std::uint32_t dwells, const std::string& path) {
   std::vector<Point> points;
   for (std::size_t pair = 0; pair < run.responses.size(); ++pair) {
     for (const StoredPoint& point : run.responses[pair].points) {
-      if (point.dwell < dwells) points.push_back(point_of(point, pair));
+      if (point.dwell < dwells) points.push_back(point_of(point, pair, path));
     }
   }
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) {
@@ -150,7 +208,6 @@ std::int64_t one_number(Database& database, const std::string& query) {
 }
 
 PartStart next_start(Database& database, std::uint32_t dwell) {
-  const std::string here = " WHERE dwell = " + std::to_string(dwell);
   return {.dwell = dwell,
           .tick = static_cast<std::uint64_t>(one_number(
               database,
@@ -159,10 +216,7 @@ PartStart next_start(Database& database, std::uint32_t dwell) {
               "ifnull((SELECT max(tick) FROM sample), -1), "
               "ifnull((SELECT max(first_tick + block_samples) FROM block JOIN dwell ON "
               "dwell.id = block.dwell), -1), "
-              "ifnull((SELECT max(first_tick) FROM part), -1))")),
-          .attempt = static_cast<std::uint32_t>(one_number(
-              database, "SELECT 1 + max(ifnull((SELECT max(attempt) FROM block" + here +
-                            "), -1), ifnull((SELECT max(attempt) FROM lesson" + here + "), -1))"))};
+              "ifnull((SELECT max(first_tick) FROM part), -1))"))};
 }
 
 bool same(const Dwell& a, const Dwell& b) {
@@ -177,15 +231,21 @@ bool same(const Dwell& a, const Dwell& b) {
 
 }  // namespace
 
+bool is_begun(const std::string& path) {
+  Database database{path, Database::Mode::read};
+  return !tables_of(database).empty();
+}
+
 UnfinishedRun read_unfinished(const std::string& path) {
   refuse_not_begun(path);
   UnfinishedRun run{.stored = read_sweep(path), .finished = {}, .start = {}};
   Database database{path, Database::Mode::read};
   refuse_other_layout(path, database);
-  const std::set<std::uint32_t> condemned = condemned_dwells(run.stored);
-  const std::uint32_t dwells = finished_dwells(run.stored, condemned);
+  const std::set<std::uint32_t> broken_off = broken_off_dwells(run.stored);
+  const std::set<std::uint32_t> condemned = condemned_dwells(run.stored, broken_off);
+  const std::uint32_t dwells = finished_dwells(run.stored, broken_off, condemned);
   run.finished = {.dwells = dwells,
-                  .points = points_of(run.stored, dwells),
+                  .points = points_of(run.stored, dwells, path),
                   .lessons = lessons_of(database),
                   .condemned = {condemned.begin(), condemned.lower_bound(dwells)},
                   .refined = {}};

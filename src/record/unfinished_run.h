@@ -20,9 +20,15 @@ struct UnfinishedRun {
   bool done() const { return stored.fact("outcome") == "done"; }
 };
 
-// A dwell is finished when its timing is on record, which is written last, and none of its points
-// is `stopped`; the first that is not is where the run goes on. Throws SweepFileError for what is
-// no sweep file, and for one that this version would have laid out differently.
+// False for what a run leaves that was killed before its plan was on the disk: an empty file, or a
+// database with nothing in it. Throws SweepFileError for what cannot be read: nobody knows what is
+// lost with that.
+bool is_begun(const std::string& path);
+
+// A dwell is finished when its timing is on record, which is written last, and the sweep did not
+// end in it; the first that is not is where the run goes on. What a soft limit has given up is
+// finished. Throws SweepFileError for what is no sweep file, and for one that this version would
+// have laid out differently.
 UnfinishedRun read_unfinished(const std::string& path);
 
 // The dwells that refinement has added to the stored plan, as candidates of the plan. Throws

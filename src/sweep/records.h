@@ -139,7 +139,8 @@ enum class EventKind : std::uint8_t {
   started,
   probed,  // the first pass has ended; value: modes found
   dwell_began,
-  model_doubted,  // value: what came of it: 0 confirmed, 1 replaced, 2 given up, 3 see review()
+  model_doubted,  // value: what came of it: 0 confirmed, 1 replaced, 2 given up, 3 see review();
+                  // or see below
   checked,        // a modelled dwell, by detection; value: disagreement, dB; see Check
   condemned,   // its points have to be measured again; value: disagreement, dB, with the model of
                // the sweep; 0: its modes turned out wrong
@@ -162,6 +163,10 @@ enum class EventKind : std::uint8_t {
 };
 
 const char* to_string(EventKind kind) noexcept;
+
+// Values of model_doubted that are no verdict.
+inline constexpr double doubt_begins = 4.0;  // the chirp is played again, to find out
+inline constexpr double not_reviewed = 5.0;  // the sweep was resumed behind its last dwell
 
 struct Event {
   EventKind kind = EventKind::started;

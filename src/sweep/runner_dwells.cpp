@@ -121,10 +121,13 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
       refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
       for (; point != finished.points.end() && point->dwell == dwell_ && point->tone == tone;
            ++point) {
-        if (point->pair == 0 && tone == 0) leveller_.accept(*point);
+        // What a soft limit gave up taught neither the level nor the model.
+        const bool given_up = point->status == PointStatus::stopped;
+        if (point->pair == 0 && tone == 0 && !given_up) leveller_.accept(*point);
         teach_refiner(*point);
         if (plan_.judgement.settling == Settling::model) review_.set(*point);
-        if (point->settled_by == SettledBy::model) trust_.dwell_ended(dwell_, true, false);
+        if (point->settled_by == SettledBy::model && !given_up)
+          trust_.dwell_ended(dwell_, true, false);
       }
       refiner_.learn();
     }
@@ -171,8 +174,15 @@ void SweepRunner::conclude_dwell() noexcept {
     return;
   }
   if (try_again()) return;
-  finish_dwell();
   check_model();
+  // On the disk with the dwell's points: those who go on after a kill have to know.
+  if (trust_.doubted()) {
+    announce({.kind = EventKind::model_doubted,
+              .dwell = dwell_,
+              .tick = last_tick_,
+              .value = doubt_begins});
+  }
+  finish_dwell();
   if (!trust_.doubted()) {
     next_dwell();
     return;

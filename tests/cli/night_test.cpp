@@ -1,4 +1,5 @@
 // `sinerig night`: several sweeps as one job.
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -40,13 +41,21 @@ class WatchedTime final : public cli::WallTime {
  public:
   explicit WatchedTime(std::int64_t start_s) : time_{start_s} {}
   std::int64_t now_s() override { return time_.now_s(); }
-  bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests) override {
+  bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
+                  const std::function<void()>& meanwhile) override {
     waits.push_back(time_s - now_s());
-    return time_.wait_until(time_s, stop_requests);
+    const bool go = time_.wait_until(time_s, stop_requests, meanwhile);
+    if (raised_after_wait != 0) std::raise(raised_after_wait);
+    return go;
   }
-  void pass(double seconds) override { time_.pass(seconds); }
+  void pass(double seconds) override {
+    time_.pass(seconds);
+    if (raised_after_sweep != 0) std::raise(raised_after_sweep);
+  }
 
   std::vector<std::int64_t> waits;
+  int raised_after_wait = 0;  // signals
+  int raised_after_sweep = 0;
 
  private:
   cli::PassingTime time_;
@@ -147,6 +156,84 @@ TEST_F(Night, WaitsForTheTimesOfTheJob) {
   EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 0);
   EXPECT_EQ(time.waits, (std::vector<std::int64_t>{1000, 60}));
   EXPECT_GT(time.now_s(), 1772398800 + 1060) << "sweeps take their time, too";
+}
+
+TEST_F(Night, IsStoppedByASignalBetweenItsWaitAndTheSweep) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  WatchedTime time{1772398800};
+  time.raised_after_wait = SIGTERM;
+  const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+  EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 4);
+  EXPECT_EQ(time.waits.size(), 1U);
+  EXPECT_FALSE(fs::exists(path("out/axis-1.sweep"))) << "nothing has moved";
+}
+
+TEST_F(Night, IsDoneWhereASignalComesAfterItsLastSweep) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  for (const int code : {4, 0}) {
+    WatchedTime time{1772398800};
+    time.raised_after_sweep = SIGTERM;
+    const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+    EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), code);
+  }
+  EXPECT_EQ(record::read_sweep(path("out/axis-2.sweep")).fact("outcome"), "done");
+}
+
+// It may be all that is left of a night.
+TEST_F(Night, AFileThatCannotBeReadIsLeftAlone) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\n");
+  ASSERT_EQ(run({"night", "night.toml"}).code, 0);
+  record::Database{path("out/axis-1.sweep"), record::Database::Mode::write}.execute(
+      "PRAGMA user_version = 99");
+  for (const bool no_database : {false, true}) {
+    if (no_database) write("out/axis-1.sweep", std::string(5000, 'x'));
+    const std::string before = read("out/axis-1.sweep");
+    const auto again = run({"night", "night.toml"});
+    EXPECT_EQ(again.code, 1);
+    EXPECT_THAT(again.err, HasSubstr(no_database ? "out/axis-1.sweep: not a sweep file, or damaged"
+                                                 : "out/axis-1.sweep: was written by a newer "
+                                                   "sinerig"));
+    EXPECT_EQ(read("out/axis-1.sweep"), before);
+  }
+}
+
+TEST_F(Night, AFileInWhichNothingHasBegunIsBegunAnew) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  fs::create_directories(path("out"));
+  write("out/axis-1.sweep", "");
+  record::Database{path("out/axis-2.sweep"), record::Database::Mode::create}.execute(
+      "PRAGMA journal_mode = WAL");
+  const auto ran = run({"night", "night.toml"});
+  EXPECT_EQ(ran.code, 0) << ran.err;
+  for (const char* name : {"out/axis-1.sweep", "out/axis-2.sweep"}) {
+    EXPECT_EQ(record::read_sweep(path(name)).fact("outcome"), "done") << name;
+    EXPECT_FALSE(fs::exists(path(name) + "-old"));
+  }
+}
+
+// One that breaks meanwhile costs the night that sweep, not the others, nor the summary.
+TEST_F(Night, AFileThatBreaksMeanwhileIsARowOfTheSummary) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  class BreakingTime final : public cli::WallTime {
+   public:
+    explicit BreakingTime(std::string file) : file_{std::move(file)} {}
+    std::int64_t now_s() override { return 1772398800; }
+    bool wait_until(std::int64_t, const std::atomic<int>&, const std::function<void()>&) override {
+      return true;
+    }
+    void pass(double) override {
+      if (!fs::exists(file_)) std::ofstream{file_} << std::string(5000, 'x');
+    }
+
+   private:
+    std::string file_;
+  } time{path("out/axis-2.sweep")};
+  const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+  EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 3);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "done");
+  EXPECT_EQ(summary().at("sweeps").at(1).at("outcome"), "failed");
+  EXPECT_THAT(summary()["sweeps"][1].at("detail").get<std::string>(), HasSubstr("axis-2.sweep"));
+  EXPECT_EQ(read("out/axis-2.sweep"), std::string(5000, 'x'));
 }
 
 TEST_F(Night, ThatBeganYesterdayDoesNotWaitForTomorrow) {

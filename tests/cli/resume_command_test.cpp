@@ -135,6 +135,25 @@ TEST_F(Resume, MarksAKilledPart) {
               HasSubstr("\"outcome\": \"killed\""));
 }
 
+// Killed behind the last dwell, before its modelled points had been held against each other.
+TEST_F(Resume, SaysThatAModelledSweepIsNotReviewed) {
+  write("rig.toml",
+        "[loop]\nrate_hz = 1000\n"
+        "[sweep]\nstart_hz = 1\nstop_hz = 100\npoints = 12\namplitude = 1\nsettling = \"model\"\n"
+        "check_fraction = 0\n[limits]\n[actuator]\n[sensor.y]\nnoise_rms = 1e-5\n"
+        "[plant]\nkind = \"mechanical\"\ninertia = 0.02\ndamping = 0.1\nstiffness = 50\n");
+  ASSERT_EQ(run({"run", "rig.toml", "--no-report"}).code, 0);
+  record::Database{path("rig.sweep"), record::Database::Mode::write}.execute(
+      "UPDATE part SET outcome = NULL, finished_utc = NULL; DELETE FROM run WHERE key = 'outcome'");
+  const auto resumed = run({"resume", "rig.sweep"});
+  EXPECT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("rig.sweep: its modelled points are not held against a model "
+                                     "of the whole sweep any more"));
+  const auto stored = record::read_sweep(path("rig.sweep"));
+  EXPECT_EQ(stored.events.back().kind, "model_doubted");
+  EXPECT_EQ(stored.events.back().value, 5.0);
+}
+
 TEST_F(Resume, ARunStoppedByALimitStopsThereAgain) {
   std::string text = rig("", "4");
   text.replace(text.find("[sensor.y]\n"), 11, "[sensor.y]\nmax = 0.2\n");

@@ -72,6 +72,17 @@ TEST_F(RetriedRun, StopsCleanlyWhenItsTriesAreSpent) {
   EXPECT_EQ(events().back(), "finished");
 }
 
+TEST_F(RetriedRun, KeepsTheFileItWasToReplaceWhereTheDriveDoesNotAnswer) {
+  write("rig.toml", rig("", "", ""));
+  ASSERT_EQ(run({"run", "rig.toml", "--no-report"}).code, 0);
+  const std::string before = read("rig.sweep");
+  write("rig.toml", rig("", "connection_lost_s = [[0, 1000]]", ""));
+  const auto refused = run({"run", "rig.toml", "--force"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("the simulated drive does not answer"));
+  EXPECT_EQ(read("rig.sweep"), before);
+}
+
 TEST_F(RetriedRun, TellsOfItsPreflightAndStopsBeforeTheSweepWhereItFails) {
   write("rig.toml", rig("preflight = true\npreflight_gain = [0.5, 2]", "", ""));
   const auto passed = run({"run", "rig.toml", "--no-report"});

@@ -1,6 +1,8 @@
 // What a service manager hears of a run.
 #include <chrono>
 #include <cstdlib>
+#include <filesystem>
+#include <optional>
 #include <poll.h>
 #include <string>
 #include <vector>
@@ -97,6 +99,21 @@ TEST_F(Service, HearsOfReadinessStatusAndTheEnd) {
               ElementsAre("READY=1", "STATUS=point 1 of 2", "STATUS=point 2 of 2", "STOPPING=1"));
 }
 
+TEST_F(Service, IsFedByTimeWhereNoLoopIsToRun) {
+  using std::chrono::milliseconds;
+  Manager manager{socket_};
+  ServiceNotifier service{socket_, std::chrono::seconds{1}};
+  service.ready();
+  service.ready();
+  service.progress(5, start + milliseconds{1000});
+  service.idle(start + milliseconds{1200});
+  service.idle(start + milliseconds{1250});
+  service.idle(start + milliseconds{1300});
+  EXPECT_THAT(manager.all(), ElementsAre("READY=1", "WATCHDOG=1", "WATCHDOG=1"));
+  service.progress(5, start + milliseconds{1600});  // of another loop
+  EXPECT_THAT(manager.all(), ElementsAre("WATCHDOG=1"));
+}
+
 TEST_F(Service, IsNotMissedWhereThereIsNone) {
   for (const std::string& nowhere :
        {std::string{}, std::string{"relative"}, socket_, "/" + std::string(200, 'x')}) {
@@ -136,6 +153,59 @@ TEST_F(Service, IsToldWhereARunIsUntilItIsStopped) {
   program.send(SIGTERM);
   EXPECT_EQ(program.finish().code, 4);
   EXPECT_EQ(manager.all().back(), "STOPPING=1\nWATCHDOG=1");
+}
+
+class NightService : public Service {
+ protected:
+  static std::string rig(const std::string& clock) {
+    return "[loop]\nrate_hz = 500\nclock = \"" + clock +
+           "\"\n[sweep]\nspacing = \"list\"\nfrequencies_hz = [50]\namplitude = 0.5\n"
+           "[limits]\n[actuator]\n[sensor.y]\n"
+           "[plant]\nkind = \"transfer_function\"\nnum = [60]\nden = [1, 60]\n";
+  }
+  void start(Manager& /*listens first*/, const std::string& job) {
+    write("night.toml", "[night]\nfolder = \"out\"\n" + job);
+    setenv("NOTIFY_SOCKET", socket_.c_str(), 1);
+    setenv("WATCHDOG_USEC", "200000", 1);
+    program_.emplace(std::vector<std::string>{"night", "night.toml", "--quiet"}, folder_);
+    unsetenv("NOTIFY_SOCKET");
+    unsetenv("WATCHDOG_USEC");
+  }
+  std::optional<test::Program> program_;
+};
+
+TEST_F(NightService, IsReadyOnceAndStopsAtTheEndOfTheNight) {
+  Manager manager{socket_};
+  write("rig.toml", rig("virtual"));
+  start(manager, "[[night.sweep]]\nrig = \"rig.toml\"\nrepeat = 3\n");
+  EXPECT_EQ(manager.next(patience_ms), "READY=1");
+  const std::string stopping = "STOPPING=1\nWATCHDOG=1";
+  std::string message;
+  do {
+    message = manager.next(patience_ms);
+    ASSERT_FALSE(message.empty());
+    EXPECT_NE(message, "READY=1");
+  } while (message != stopping);
+  EXPECT_TRUE(std::filesystem::exists(path("out/rig-3.sweep")));
+  EXPECT_EQ(program_->finish().code, 0);
+  EXPECT_TRUE(manager.all().empty());
+}
+
+TEST_F(NightService, IsFedAndToldWhatItWaitsFor) {
+  Manager manager{socket_};
+  write("rig.toml", rig("monotonic"));
+  start(manager, "[[night.sweep]]\nrig = \"rig.toml\"\nstart_after_s = 100000\n");
+  EXPECT_EQ(manager.next(patience_ms), "READY=1");
+  EXPECT_THAT(manager.next(patience_ms),
+              testing::MatchesRegex("STATUS=waiting until [0-9:]+ for rig-1"));
+  for (int meals = 0; meals < 4; ++meals) EXPECT_EQ(manager.next(patience_ms), "WATCHDOG=1");
+  program_->send(SIGTERM);
+  std::string message;
+  do {
+    message = manager.next(patience_ms);
+    ASSERT_FALSE(message.empty());
+  } while (message != "STOPPING=1\nWATCHDOG=1");
+  EXPECT_EQ(program_->finish().code, 4);
 }
 
 }  // namespace

@@ -71,6 +71,22 @@ TEST(ASecondSignal, LeavesTheRampForNeutralAtOnce) {
   }
 }
 
+// Of those that follow, too: the run may be over, its file being written.
+TEST(ASignal, StopsWhateverIsAroundTheRun) {
+  RunControl night;
+  const cli::StopOnSignal stops_the_night{night};
+  {
+    RunControl run;
+    const cli::StopOnSignal stops_the_run{run};
+    std::raise(SIGTERM);
+    EXPECT_EQ(run.stop_requests.load(), 1);
+  }
+  EXPECT_EQ(night.stop_requests.load(), 1);
+  RunControl next;
+  const cli::StopOnSignal stops_the_next{next};
+  EXPECT_EQ(next.stop_requests.load(), 1) << "as if it had come a moment later";
+}
+
 class StoppedTwice : public test::ProgramTest {};
 
 TEST_F(StoppedTwice, EndsBeforeItsRampAndExitsAsInterrupted) {

@@ -39,22 +39,27 @@ TEST_F(LocalTime, OfDayFollowsTheChangeOfTheClocks) {
 TEST(PassingTime, PassesAtOnceAndNeverBack) {
   PassingTime time{1000};
   const std::atomic<int> none{0};
-  EXPECT_TRUE(time.wait_until(5000, none));
+  int called = 0;
+  const auto meanwhile = [&] {
+    ++called;
+  };
+  EXPECT_TRUE(time.wait_until(5000, none, meanwhile));
+  EXPECT_EQ(called, 1);
   EXPECT_EQ(time.now_s(), 5000);
-  EXPECT_TRUE(time.wait_until(4000, none));
+  EXPECT_TRUE(time.wait_until(4000, none, meanwhile));
   EXPECT_EQ(time.now_s(), 5000);
   time.pass(60.5);
   EXPECT_EQ(time.now_s(), 5060);
   const std::atomic<int> stop{1};
-  EXPECT_FALSE(time.wait_until(9000, stop));
+  EXPECT_FALSE(time.wait_until(9000, stop, meanwhile));
 }
 
 TEST(SystemTime, WaitsNoLongerThanItIsTold) {
   SystemTime time;
   const std::atomic<int> none{0};
-  EXPECT_TRUE(time.wait_until(time.now_s(), none));
+  EXPECT_TRUE(time.wait_until(time.now_s(), none, [] {}));
   const std::atomic<int> stop{1};
-  EXPECT_FALSE(time.wait_until(time.now_s() + 1000, stop));
+  EXPECT_FALSE(time.wait_until(time.now_s() + 1000, stop, [] {}));
 }
 
 }  // namespace

@@ -29,8 +29,10 @@ RunInfo an_info() {
           .plan = plan_sweep(sweep, {}, 1000.0)};
 }
 
-Point a_point(std::uint32_t dwell, PointStatus status = PointStatus::good) {
+Point a_point(std::uint32_t dwell, PointStatus status = PointStatus::good,
+              PointReason reason = PointReason::none) {
   Point point;
+  point.reason = reason;
   point.dwell = dwell;
   point.frequency_hz = 1.25 * (dwell + 1);
   point.response = {1.0 / (dwell + 3.0), -2.0 / 7.0};
@@ -49,10 +51,10 @@ class ResumedFile : public testing::Test {
   std::string path() const { return folder_ / "run.sweep"; }
 
   void dwell(SweepWriter& writer, std::uint32_t id, std::uint64_t first_tick,
-             PointStatus status = PointStatus::good) {
+             PointStatus status = PointStatus::good, PointReason reason = PointReason::none) {
     writer.write(Block{.dwell = id, .channel = 2, .first_tick = first_tick + 10});
     writer.write(Lesson{.dwell = id, .response = {1.0, 2.0}, .white = 1e-9, .scatter_dof = 6.0});
-    writer.write(a_point(id, status));
+    writer.write(a_point(id, status, reason));
     writer.write(DwellTiming{.dwell = id, .first_tick = first_tick, .ticks = 5000});
   }
 
@@ -89,7 +91,6 @@ TEST_F(ResumedFile, GoesOnWithTheDwellThatWasStopped) {
   EXPECT_EQ(run.finished.points[1].response, a_point(1).response);
   EXPECT_EQ(run.finished.lessons.size(), 3U);
   EXPECT_EQ(run.start.dwell, 2U);
-  EXPECT_EQ(run.start.attempt, 1U);
   EXPECT_GE(run.start.tick, 15000U);
 }
 
@@ -112,6 +113,54 @@ TEST_F(ResumedFile, KnowsWhatIsStillToBeMeasuredAgain) {
   EXPECT_FALSE(run.done());
   EXPECT_EQ(run.finished.dwells, 4U);
   EXPECT_EQ(run.finished.condemned, (std::vector<std::uint32_t>{2, 3}));
+}
+
+// Killed, or stopped, while the modes were looked for once more.
+TEST_F(ResumedFile, CondemnsWhatWasDoubtedAndNotJudged) {
+  const auto condemned = [&] {
+    return read_unfinished(path()).finished.condemned;
+  };
+  const auto doubt = [](std::uint32_t id, std::uint64_t tick, double value) {
+    return Event{.kind = EventKind::model_doubted, .dwell = id, .tick = tick, .value = value};
+  };
+  const auto modelled_dwell = [&](SweepWriter& writer, std::uint32_t id, std::uint64_t first_tick) {
+    Point point = a_point(id);
+    point.settled_by = SettledBy::model;
+    writer.write(point);
+    writer.write(DwellTiming{.dwell = id, .first_tick = first_tick, .ticks = 5000});
+  };
+  {
+    SweepWriter first{path(), an_info(), SweepWriter::IfExists::refuse};
+    first.begin_part({});
+    first.write(Event{.kind = EventKind::started});
+    modelled_dwell(first, 0, 0);
+    dwell(first, 1, 5000);
+    first.write(doubt(1, 9999, doubt_begins));
+    first.commit();
+    EXPECT_EQ(condemned(), std::vector<std::uint32_t>{0});
+    first.write(doubt(1, 11000, 0.0));  // the modes are confirmed
+    first.commit();
+    EXPECT_TRUE(condemned().empty());
+    first.write(doubt(1, 11001, doubt_begins));
+    first.end_part("interrupted", "stop requested");
+    first.finish();
+  }
+  const std::vector<std::uint32_t> doubted = condemned();
+  EXPECT_EQ(doubted, std::vector<std::uint32_t>{0});
+
+  // What another part finds of its own modes is no verdict on those.
+  SweepWriter second{path(), an_info()};
+  second.begin_part(read_unfinished(path()).start);
+  second.write(doubt(2, 0, not_reviewed));
+  second.write(Event{.kind = EventKind::started});
+  modelled_dwell(second, 2, 100);
+  second.write(doubt(2, 5100, doubt_begins));
+  second.write(doubt(2, 5200, 0.0));
+  second.commit();
+  EXPECT_EQ(condemned(), doubted);
+  second.write(Event{.kind = EventKind::remeasured, .dwell = 0, .tick = 6000});
+  dwell(second, 0, 6000);
+  EXPECT_TRUE(condemned().empty());
 }
 
 TEST_F(ResumedFile, KeepsWhatWasFinishedAndReplacesTheStoppedPoint) {
@@ -143,6 +192,94 @@ TEST_F(ResumedFile, KeepsWhatWasFinishedAndReplacesTheStoppedPoint) {
   EXPECT_EQ(stored.fact("outcome"), "done");
   EXPECT_TRUE(read_unfinished(path()).done());
   EXPECT_FALSE(can_be_resumed(path()));
+}
+
+// The sweep went on behind dwell 1 and was killed in dwell 3.
+TEST_F(ResumedFile, LeavesThePointThatASoftLimitGaveUp) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    dwell(writer, 0, 0);
+    // A device's fault had passed before.
+    writer.write(Event{.kind = EventKind::tripped, .dwell = 1, .tick = 6000});
+    writer.write(Event{.kind = EventKind::limited, .dwell = 1, .tick = 7000});
+    dwell(writer, 1, 5000, PointStatus::stopped, PointReason::soft_limit);
+    dwell(writer, 2, 10000);
+    writer.write(Block{.dwell = 3, .channel = 2, .first_tick = 15010});
+    writer.commit();
+  }
+  const UnfinishedRun run = read_unfinished(path());
+  EXPECT_EQ(run.finished.dwells, 3U);
+  ASSERT_EQ(run.finished.points.size(), 3U);
+  EXPECT_EQ(run.finished.points[1].status, PointStatus::stopped);
+  EXPECT_EQ(run.finished.points[1].reason, PointReason::soft_limit);
+  EXPECT_EQ(run.start.dwell, 3U);
+}
+
+// Its tries in all were spent: the sweep has to go on with this very dwell.
+TEST_F(ResumedFile, RepeatsTheDwellInWhichASoftLimitEndedTheSweep) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    dwell(writer, 0, 0);
+    writer.write(Event{.kind = EventKind::limited, .dwell = 1, .tick = 7000});
+    dwell(writer, 1, 5000, PointStatus::stopped, PointReason::soft_limit);
+    writer.write(Event{.kind = EventKind::tripped, .dwell = 1, .tick = 7000});
+    writer.end_part("stopped", "y is outside its soft limit");
+    writer.finish();
+  }
+  EXPECT_EQ(read_unfinished(path()).finished.dwells, 1U);
+}
+
+TEST_F(ResumedFile, HasRoomForAnotherAttemptAtEveryDwell) {
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    for (std::uint32_t id = 0; id < 4; ++id) dwell(writer, id, 5000 * id);
+  }
+  SweepWriter writer{path(), an_info()};
+  writer.begin_part({.dwell = 1, .tick = 20000});
+  for (std::uint32_t id = 1; id < 4; ++id) dwell(writer, id, 5000 * id);
+  writer.finish();
+  EXPECT_EQ(texts("SELECT dwell || ':' || attempt FROM block"),
+            (std::vector<std::string>{"0:0", "1:0", "1:1", "2:0", "2:1", "3:0", "3:1"}));
+}
+
+// Whatever value an enumeration has, the last one included, comes back as itself.
+TEST_F(ResumedFile, KnowsEveryWordOfAPoint) {
+  std::vector<Point> points;
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    const std::string none = to_string(static_cast<PointReason>(UINT8_MAX));
+    std::uint8_t value = 0;
+    for (; to_string(static_cast<PointReason>(value)) != none; ++value) {
+      Point point = a_point(0);
+      point.tone = value;
+      point.reason = static_cast<PointReason>(value);
+      point.status = static_cast<PointStatus>(std::min<int>(value, 5));
+      point.settled_by = static_cast<SettledBy>(std::min<int>(value, 4));
+      points.push_back(point);
+      writer.write(point);
+    }
+    ASSERT_GT(value, 12);
+    writer.write(DwellTiming{.dwell = 0});
+  }
+  const std::vector<Point> back = read_unfinished(path()).finished.points;
+  ASSERT_EQ(back.size(), points.size());
+  for (std::size_t i = 0; i < back.size(); ++i) {
+    EXPECT_EQ(back[i].reason, points[i].reason);
+    EXPECT_EQ(back[i].status, points[i].status);
+    EXPECT_EQ(back[i].settled_by, points[i].settled_by);
+  }
+  Database{path(), Database::Mode::write}.execute("UPDATE point SET reason = 'of_tomorrow'");
+  try {
+    read_unfinished(path());
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr(path() + ": was begun by another version of sinerig"));
+    EXPECT_THAT(error.what(), HasSubstr("`of_tomorrow`"));
+  }
 }
 
 TEST_F(ResumedFile, CallsAPartWithoutAnEndKilled) {

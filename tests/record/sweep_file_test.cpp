@@ -182,6 +182,50 @@ TEST_F(SweepFile, IsNotOverwrittenUnlessTold) {
   EXPECT_EQ(read_sweep(path()).fact("outcome"), "again");
 }
 
+// What a killed run leaves: its last points are in the log beside the file.
+class ReplacedFile : public SweepFile {
+ protected:
+  ReplacedFile() {
+    SweepWriter writer{path("whole.sweep"), an_info(), SweepWriter::IfExists::refuse};
+    writer.write(a_point(0));
+    writer.write(DwellTiming{.dwell = 0});
+    for (const char* suffix : {"", "-wal"}) {
+      fs::copy_file(path("whole.sweep") + suffix, path() + suffix);
+    }
+  }
+  std::size_t points() const {
+    const StoredRun run = read_sweep(path());
+    return run.responses.empty() ? 0 : run.responses[0].points.size();
+  }
+};
+
+TEST_F(ReplacedFile, IsBackWhereTheNewRunNeverBegins) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::replace};
+  EXPECT_EQ(points(), 0U);
+  writer.discard();
+  EXPECT_FALSE(fs::exists(path() + "-old"));
+  EXPECT_FALSE(fs::exists(path() + "-old-wal"));
+  EXPECT_EQ(points(), 1U);
+}
+
+TEST_F(ReplacedFile, IsGoneWhenTheNewRunBegins) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::replace};
+  EXPECT_TRUE(fs::exists(path() + "-old"));
+  writer.begin_part({});
+  EXPECT_FALSE(fs::exists(path() + "-old"));
+  EXPECT_FALSE(fs::exists(path() + "-old-wal"));
+  EXPECT_EQ(points(), 0U);
+}
+
+TEST_F(ReplacedFile, OutlivesANewRunThatIsKilledBeforeItBegins) {
+  { const SweepWriter killed{path(), an_info(), SweepWriter::IfExists::replace}; }
+  EXPECT_TRUE(fs::exists(path() + "-old"));
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::replace};
+  EXPECT_TRUE(fs::exists(path() + "-old"));
+  writer.discard();
+  EXPECT_EQ(points(), 1U);
+}
+
 TEST_F(SweepFile, OfARunThatWasKilledHoldsEveryFinishedDwell) {
   SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
   writer.write(a_point(0));

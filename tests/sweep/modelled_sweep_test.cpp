@@ -126,6 +126,54 @@ TEST(ModelledSweep, PlaysItsFirstPassMoreQuietlyAfterASoftLimit) {
   EXPECT_EQ(run.outcome.dwells_done, 16U);
 }
 
+// Notes down in which order it is told of doubt and of finished dwells.
+class OrderedSink final : public RecordSink {
+ public:
+  void put(const Record& record) noexcept override {
+    if (const auto* timing = std::get_if<DwellTiming>(&record)) {
+      told.push_back({.dwell = timing->dwell, .value = -1.0});
+    }
+    const auto* event = std::get_if<Event>(&record);
+    if (event != nullptr && event->kind == EventKind::model_doubted) {
+      told.push_back({.dwell = event->dwell, .value = event->value});
+    }
+  }
+  void put_sample(const TickSamples&) noexcept override {}
+  bool flush() noexcept override { return true; }
+
+  struct Told {
+    std::uint32_t dwell;
+    double value;  // of model_doubted; −1: the dwell's timing
+  };
+  std::vector<Told> told;
+};
+
+// Whoever goes on after a kill finds it with the points of the dwell that raised it.
+TEST(ModelledSweep, SaysThatItDoubtsItsModesBeforeItLooksForOthers) {
+  RunnerSettings wrong = told();
+  ModePole& pole = wrong.modes->prior.poles[0];
+  pole = {.sigma_rad_s = -0.2, .omega_rad_s = two_pi * 23.0};
+  for (std::size_t i = 0; i < 2; ++i) wrong.modes->prior.covariance[triangle(i) + i] = 1e-6;
+  const SweepPlan plan = modelled_plan(0.0);
+  VirtualClock clock{TickGrid{rate_hz}};
+  const sim::SimulatedRigSettings settings = damped_axis();
+  sim::SimulatedRig rig{settings, clock};
+  Sensor* const sensors[] = {&rig.sensor(0)};
+  Guard guard{test::open_guard(1), clock.grid().period_s()};
+  OrderedSink sink;
+  SweepRunner runner{plan, wrong, clock, rig.actuator(), sensors, guard, sink};
+  RunControl control;
+  EXPECT_FALSE(runner.run(control).trip.tripped());
+  const auto begins =
+      std::find_if(sink.told.begin(), sink.told.end(),
+                   [](const OrderedSink::Told& each) { return each.value == doubt_begins; });
+  ASSERT_LT(begins, sink.told.end() - 2);
+  EXPECT_EQ(begins[1].dwell, begins->dwell);
+  EXPECT_EQ(begins[1].value, -1.0);
+  EXPECT_EQ(begins[2].dwell, begins->dwell);
+  EXPECT_EQ(begins[2].value, 2.0) << "given up: nobody looks for modes here";
+}
+
 // What an earlier part of the run has left: all dwells finished, two condemned.
 TEST(ModelledSweep, GoesOnWithWhatWasCondemned) {
   const SweepPlan plan = modelled_plan(0.0);

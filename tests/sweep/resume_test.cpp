@@ -76,6 +76,15 @@ FinishedDwells first_of(const Measured& run, std::uint32_t dwells, std::size_t a
   return finished;
 }
 
+// The amplitude that the first block of a dwell was measured with.
+double first_amplitude(const Measured& run, std::uint32_t dwell) {
+  for (const Block& block : run.sink.blocks) {
+    if (block.dwell == dwell && block.channel == applied_channel)
+      return std::abs(block.coefficients.phasor());
+  }
+  return 0.0;
+}
+
 class GoingOn : public testing::TestWithParam<std::uint32_t> {};
 
 TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
@@ -112,20 +121,30 @@ TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   ASSERT_GE(whole.sink.lessons.size(), 12U);
   // The amplitude of the first attempt follows from the recalled points alone, to the last bit.
   const Measured rest = run_from(plan, 0.01, first_of(whole, 8));
-  const auto amplitude_of = [](const Measured& run) {
-    for (const Block& block : run.sink.blocks) {
-      if (block.dwell == 8 && block.channel == applied_channel)
-        return std::abs(block.coefficients.phasor());
-    }
-    return 0.0;
-  };
-  EXPECT_NEAR(amplitude_of(rest), amplitude_of(whole), 1e-12);
-  EXPECT_NE(amplitude_of(rest), 0.0);
+  EXPECT_NEAR(first_amplitude(rest, 8), first_amplitude(whole, 8), 1e-12);
+  EXPECT_NE(first_amplitude(rest, 8), 0.0);
   // Without the lessons the colour of the noise would have to be learnt anew.
   FinishedDwells forgetful = first_of(whole, 8);
   forgetful.lessons.clear();
   const Measured again = run_from(plan, 0.01, forgetful);
   EXPECT_GT(rest.sink.points.front().dof, again.sink.points.front().dof);
+}
+
+// The first part went on behind it without having learnt anything of the level.
+TEST(RestOfASweep, LearnsNoLevelFromWhatASoftLimitGaveUp) {
+  const SweepPlan plan = levelled_plan();
+  const Measured whole = run_from(plan, 0.0, {});
+  FinishedDwells given_up = first_of(whole, 8);
+  FinishedDwells without = given_up;
+  ASSERT_EQ(given_up.points.back().dwell, 7U);
+  without.points.pop_back();
+  Point& last = given_up.points.back();
+  last.status = PointStatus::stopped;
+  last.reason = PointReason::soft_limit;
+  last.response *= 0.2;
+  const double amplitude = first_amplitude(run_from(plan, 0.0, given_up), 8);
+  EXPECT_GT(amplitude, 0.0);
+  EXPECT_NEAR(amplitude, first_amplitude(run_from(plan, 0.0, without), 8), 1e-12);
 }
 
 TEST(RestOfASweep, ChoosesTheSameRefinementsAndTellsOnlyOfNewOnes) {
