@@ -104,6 +104,11 @@ SendResult Bus::send(const Frame& frame) noexcept {
   return result;
 }
 
+void Bus::reserve(Room room) noexcept {
+  constexpr std::size_t for_lists = 128;
+  socket_.set_send_room(room == Room::lists ? for_lists : 2 * frames_per_tick_);
+}
+
 void Bus::wait_and_poll(std::int64_t timeout_ns) noexcept {
   socket_.wait(timeout_ns);
   poll();

@@ -55,6 +55,15 @@ class Bus {
   // out, late, when it comes back.
   SendResult send(const Frame& frame) noexcept SINERIG_NONBLOCKING;
 
+  // How many frames may wait for the wire: in the loop a few, because a bus that nobody
+  // acknowledges keeps them and sends them, old as they are, when the cable is back; for lists as
+  // many as come, so that neutral and disarm line up behind those. Not for the loop.
+  enum class Room : std::uint8_t { set_points, lists };
+  void reserve(Room room) noexcept;
+
+  // Frames that somebody sends at every tick. Before the loop.
+  void plan_to_send(std::size_t frames_per_tick) noexcept { frames_per_tick_ += frames_per_tick; }
+
   // poll() after waiting for something to arrive. Not for the loop.
   void wait_and_poll(std::int64_t timeout_ns) noexcept;
 
@@ -76,6 +85,7 @@ class Bus {
   BusState state_ = BusState::up;
   BusCounters counters_;
   std::int64_t next_rebind_ns_ = 0;
+  std::size_t frames_per_tick_ = 0;
 };
 
 }  // namespace sinerig::can

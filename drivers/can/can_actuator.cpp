@@ -16,15 +16,19 @@ CanActuator::CanActuator(Bus& bus, CommandSettings settings)
   for (Sequence* list :
        {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown})
     listen_for(bus_, *list);
+  bus_.plan_to_send(1 + settings_.keep_alive.size());
   held_.value = settings_.neutral;
 }
 
 CanActuator::~CanActuator() {
   release();
-  if (started_) run_all(bus_, settings_.shutdown);
+  Patience patience;
+  if (started_) run_all(bus_, settings_.shutdown, patience);
 }
 
+// A drive that could not be told to stop is told first: its start-up list does not say so.
 void CanActuator::start() {
+  release();
   started_ = true;
   run(bus_, settings_.startup, "start-up");
 }
@@ -32,15 +36,17 @@ void CanActuator::start() {
 // Neutral goes out before the drive is armed: one that finds a stale set-point would jump.
 void CanActuator::arm() {
   released_ = false;
+  bus_.reserve(Bus::Room::lists);
   try {
-    compose(settings_.neutral);
-    send_surely(bus_, frame_);
+    Patience patience;
+    send_neutral(patience);
     run(bus_, settings_.arm, "arm");
   } catch (...) {
     release();
     throw;
   }
   health_.begin();
+  bus_.reserve(Bus::Room::set_points);
 }
 
 Sample CanActuator::write(double command) noexcept {
@@ -77,12 +83,28 @@ void CanActuator::keep_alive(std::int64_t now_ns) noexcept {
   }
 }
 
+// A device may take a set-point only with the SYNC that comes with every one.
+bool CanActuator::send_neutral(Patience& patience) noexcept {
+  compose(settings_.neutral);
+  bool all = send_surely(bus_, frame_, patience) == SendResult::sent;
+  if (all) held_.value = encoded_;
+  for (const KeepAlive& kept : settings_.keep_alive) {
+    if (kept.period_ns > 0) continue;
+    all = send_surely(bus_, kept.frame, patience) == SendResult::sent && all;
+  }
+  return all;
+}
+
 void CanActuator::release() noexcept {
   if (released_) return;
-  released_ = true;
-  compose(settings_.neutral);
-  if (send_surely(bus_, frame_) == SendResult::sent) held_.value = encoded_;
-  run_all(bus_, settings_.disarm);
+  bus_.poll();  // what happened to the bus since the last tick
+  bus_.reserve(Bus::Room::lists);
+  Patience patience;
+  const bool neutral = send_neutral(patience);
+  const bool disarmed = run_all(bus_, settings_.disarm, patience) == 0;
+  bus_.poll();
+  // A bus that died meanwhile has thrown away what waited in its queue.
+  released_ = neutral && disarmed && bus_.state() == BusState::up;
 }
 
 std::string CanActuator::reason() const {

@@ -8,6 +8,7 @@ CanSensor::CanSensor(Bus& bus, const FeedbackSettings& settings)
     : bus_(bus), settings_(settings), slot_(0), unwrapper_(settings.signal.wrap_modulus) {
   check(settings_.signal, settings_.pattern.minimum_length);
   slot_ = bus_.listen(settings_.pattern, settings_.checksum);
+  if (settings_.poll) bus_.plan_to_send(1);
 }
 
 Sample CanSensor::read() noexcept {

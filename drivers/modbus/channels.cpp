@@ -71,7 +71,9 @@ ModbusActuator::~ModbusActuator() {
   });
 }
 
+// A drive that could not be told to stop is told first: its start-up list does not say so.
 void ModbusActuator::start() {
+  release();
   started_ = true;
   link_.idle([&](Transport& transport) { run(transport, settings_.startup, "start-up"); });
 }
@@ -153,8 +155,9 @@ void ModbusActuator::look_after_health() noexcept {
 
 void ModbusActuator::release() noexcept {
   if (released_) return;
-  released_ = true;
-  if (link_.release(settings_.neutral, settings_.disarm)) held_.value = settings_.neutral;
+  const Link::Released done = link_.release(settings_.neutral, settings_.disarm);
+  if (done.neutral) held_.value = settings_.neutral;
+  released_ = done.neutral && done.disarmed;
 }
 
 std::string ModbusActuator::reason() const {

@@ -56,7 +56,10 @@ class ModbusActuator final : public Actuator {
   // refused, or no connection. Fault::device: its health is not what it must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
+  // What the device does not take is tried again by the next release(), by start() and by the
+  // destructor.
   void release() noexcept override;
+  bool released() const noexcept { return released_; }
 
   // Why the last command had a fault; empty when it had none. Not for the loop.
   std::string reason() const;

@@ -68,9 +68,11 @@ class ModbusDevice final : public Device {
 
   void rearm() override {
     for (const auto& link : links_) link->reconnect();
-    if (!actuator_) return;
-    actuator_->start();
-    actuator_->arm();
+    if (actuator_) {
+      actuator_->start();
+      actuator_->arm();
+    }
+    for (const auto& link : links_) link->forget();
   }
 
   Actuator* actuator() noexcept override { return actuator_ ? &*actuator_ : nullptr; }

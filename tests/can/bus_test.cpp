@@ -410,6 +410,12 @@ TEST_F(CanBus, ReleaseWaitsForRoomInAFullQueue) {
   EXPECT_EQ(seen.back(), float_frame(command_id, 0.0));
 }
 
+CommandSettings command_with_idle() {
+  CommandSettings command = torque_command();
+  command.disarm = {{"idle", frame_of(0x07, {1}), {}, 0, 1}};
+  return command;
+}
+
 TEST_F(CanBus, ReleaseOnADeadBusReturns) {
   Bus bus("vcan0", false);
   CommandSettings command = torque_command();
@@ -423,7 +429,93 @@ TEST_F(CanBus, ReleaseOnADeadBusReturns) {
   shell("ip link set vcan0 down");
   const std::int64_t before_ns = monotonic_ns();
   actuator.release();
-  EXPECT_LT(monotonic_ns() - before_ns, 100'000'000);
+  EXPECT_LT(monotonic_ns() - before_ns, 1'000'000'000);
+  EXPECT_FALSE(actuator.released());
+}
+
+TEST_F(CanBus, ReleaseOutlastsABusOffWithTheUsualRestart) {
+  Peer peer;
+  Bus bus("vcan0", false);
+  CanActuator actuator(bus, command_with_idle());
+  bus.start();
+  actuator.arm();
+  actuator.write(1.0);
+  peer.received();
+  Peer::inject_error(CAN_ERR_BUSOFF);
+  std::thread controller([] {
+    usleep(100'000);
+    Peer::inject_error(CAN_ERR_RESTARTED);
+  });
+  actuator.release();
+  controller.join();
+  EXPECT_TRUE(actuator.released());
+  EXPECT_THAT(peer.received(),
+              testing::ElementsAre(float_frame(command_id, 0.0), frame_of(0x07, {1})));
+}
+
+TEST_F(CanBus, WhatReleaseCouldNotSendGoesOutWithTheNextOneOrTheEnd) {
+  Peer peer;
+  const auto neutral_and_idle =
+      testing::ElementsAre(float_frame(command_id, 0.0), frame_of(0x07, {1}));
+  Bus bus("vcan0", false);
+  {
+    CanActuator actuator(bus, command_with_idle());
+    bus.start();
+    const auto release_while_off = [&] {
+      actuator.arm();
+      actuator.write(1.0);
+      peer.received();
+      Peer::inject_error(CAN_ERR_BUSOFF);
+      actuator.release();
+      EXPECT_FALSE(actuator.released());
+      EXPECT_TRUE(peer.received().empty());
+      Peer::inject_error(CAN_ERR_RESTARTED);
+    };
+    release_while_off();
+    actuator.release();
+    EXPECT_THAT(peer.received(), neutral_and_idle);
+    release_while_off();
+    actuator.start();
+    EXPECT_THAT(peer.received(), neutral_and_idle) << "before it is armed again";
+    release_while_off();
+  }
+  EXPECT_THAT(peer.received(), neutral_and_idle);
+}
+
+TEST_F(CanBus, AWireThatTakesNothingKeepsFewSetPointsAndNeutralBehindThem) {
+  Peer peer;
+  Bus bus("vcan0", false);
+  CanActuator actuator(bus, command_with_idle());
+  bus.start();
+  actuator.arm();
+  peer.received();
+  shell("tc qdisc replace dev vcan0 root tbf rate 8kbit burst 64 limit 100000");
+  for (int n = 0; n < 60; ++n) actuator.write(1.0);
+  EXPECT_GE(bus.counters().dropped_full, 45u);
+  actuator.release();
+  EXPECT_TRUE(actuator.released());
+  sleep(2);
+  const std::vector<Frame> seen = peer.received();
+  ASSERT_GE(seen.size(), 4u);
+  EXPECT_LE(seen.size(), 2u + 15u);
+  EXPECT_EQ(seen[seen.size() - 2], float_frame(command_id, 0.0));
+  EXPECT_EQ(seen.back(), frame_of(0x07, {1}));
+}
+
+TEST_F(CanBus, NeutralComesWithWhatComesWithEverySetPoint) {
+  Peer peer;
+  Bus bus("vcan0", false);
+  CommandSettings command = command_with_idle();
+  command.keep_alive = {{frame_of(0x80, {}), 0}, {frame_of(0x700, {5}), 100'000'000}};
+  command.arm = {{"closed loop", frame_of(0x07, {8}), {}, 0, 1}};
+  CanActuator actuator(bus, command);
+  bus.start();
+  actuator.arm();
+  EXPECT_THAT(peer.received(), testing::ElementsAre(float_frame(command_id, 0.0),
+                                                    frame_of(0x80, {}), frame_of(0x07, {8})));
+  actuator.release();
+  EXPECT_THAT(peer.received(), testing::ElementsAre(float_frame(command_id, 0.0),
+                                                    frame_of(0x80, {}), frame_of(0x07, {1})));
 }
 
 TEST_F(CanBus, ACommandThatIsNoNumberSendsNeutral) {
