@@ -65,6 +65,7 @@ class ModbusActuator final : public Actuator {
   std::string reason() const;
 
  private:
+  void begin_ages() noexcept SINERIG_NONBLOCKING;
   Fault judge() noexcept SINERIG_NONBLOCKING;
   Fault unknown_for_long() const noexcept SINERIG_NONBLOCKING;
   void look_after_health() noexcept SINERIG_NONBLOCKING;
@@ -78,6 +79,7 @@ class ModbusActuator final : public Actuator {
   Sample held_;
   Fault last_fault_ = Fault::none;
   std::int64_t confirmed_ns_ = 0;
+  bool ages_begin_ = false;  // with the next write()
   bool started_ = false;
   bool released_ = true;
 };
