@@ -31,7 +31,7 @@ void Bus::start() {
   socket_.set_filters(filters);
 }
 
-void Bus::poll() noexcept {
+bool Bus::poll() noexcept {
   if (state_ == BusState::gone) try_to_rebind();
   Received received;
   for (int n = 0; n < max_frames_per_poll; ++n) {
@@ -40,8 +40,15 @@ void Bus::poll() noexcept {
       case ReceiveResult::error_frame: note_error(received.error_class); break;
       case ReceiveResult::link_down: state_ = BusState::link_down; break;
       case ReceiveResult::gone: state_ = BusState::gone; break;
-      case ReceiveResult::nothing: counters_.overflows = socket_.overflows(); return;
+      case ReceiveResult::nothing: counters_.overflows = socket_.overflows(); return true;
     }
+  }
+  return false;
+}
+
+void Bus::drain() noexcept {
+  constexpr int longest_queue = 64;  // of net.core.rmem_max raised to tens of megabytes
+  for (int n = 0; n < longest_queue && !poll(); ++n) {
   }
 }
 

@@ -48,8 +48,13 @@ class Bus {
   // Tells the kernel which frames are wanted. Again after later listen()s.
   void start();
 
-  // Takes in everything that has arrived, at most `max_frames_per_poll` frames.
-  void poll() noexcept SINERIG_NONBLOCKING;
+  // Takes in everything that has arrived, at most `max_frames_per_poll` frames; false where more
+  // may wait.
+  bool poll() noexcept SINERIG_NONBLOCKING;
+
+  // All that has arrived while nobody looked. The kernel's queue keeps the oldest: what was sent
+  // after it was full is not there. Not for the loop.
+  void drain() noexcept;
 
   // Sends at once or never. On a dead bus nothing is tried: frames left in its queue would all go
   // out, late, when it comes back.

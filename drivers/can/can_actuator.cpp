@@ -13,9 +13,17 @@ CanActuator::CanActuator(Bus& bus, CommandSettings settings)
   check(frame_);
   check(settings_.signal, frame_.length);
   check(settings_.checksum, frame_.length);
+  compose(settings_.neutral);
   for (Sequence* list :
-       {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown})
+       {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown}) {
+    for (Step& step : *list) {
+      if (!step.neutral) continue;
+      step.frame = frame_;
+      for (const KeepAlive& kept : settings_.keep_alive)
+        if (kept.period_ns == 0) step.company.push_back(kept.frame);
+    }
     listen_for(bus_, *list);
+  }
   bus_.plan_to_send(1 + settings_.keep_alive.size());
   held_.value = settings_.neutral;
 }

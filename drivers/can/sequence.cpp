@@ -21,7 +21,7 @@ void pause_for(std::int64_t time_ns) noexcept {
 // The answer counts only if it comes after the frame: what lay in the socket before is taken in
 // first.
 Outcome run_once(Bus& bus, const Step& step, Patience& patience) noexcept {
-  bus.poll();
+  bus.drain();
   const bool expects = step.expect.has_value();
   const std::uint64_t answers = expects ? bus.slot(step.expect->slot).count : 0;
   const bool refusable = expects && step.expect->refusal.has_value();
@@ -29,6 +29,8 @@ Outcome run_once(Bus& bus, const Step& step, Patience& patience) noexcept {
 
   if (step.frame && send_surely(bus, *step.frame, patience) != SendResult::sent)
     return Outcome::not_sent;
+  for (const Frame& frame : step.company)
+    if (send_surely(bus, frame, patience) != SendResult::sent) return Outcome::not_sent;
   if (!expects) return Outcome::done;
 
   const std::int64_t deadline_ns = monotonic_ns() + step.expect->timeout_ns;

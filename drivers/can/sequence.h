@@ -26,6 +26,8 @@ struct Step {
   std::optional<Expectation> expect;
   std::int64_t delay_ns = 0;  // after sending, or after the answer
   std::uint32_t repeats = 1;  // send again this often, until the answer comes
+  bool neutral = false;       // sends the neutral set-point: CanActuator gives frame and company
+  std::vector<Frame> company = {};  // sent right after the frame
 };
 
 using Sequence = std::vector<Step>;

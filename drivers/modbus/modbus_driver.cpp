@@ -68,10 +68,12 @@ class ModbusDevice final : public Device {
 
   void rearm() override {
     for (const auto& link : links_) link->reconnect();
-    if (actuator_) {
-      actuator_->start();
-      actuator_->arm();
-    }
+    if (!actuator_) return;
+    actuator_->start();
+    actuator_->arm();
+  }
+
+  void catch_up() override {
     for (const auto& link : links_) link->forget();
   }
 

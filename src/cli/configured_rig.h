@@ -29,6 +29,7 @@ class ConfiguredRig final : public Rearm {
   std::string fault_reason() const override;
   std::string arm_again() override;
   std::vector<Remark> remarks() const;
+  bool answers_command(std::size_t sensor) const;  // Device::answers_command()
   Actuator& actuator() { return *actuator_; }
   const std::vector<Sensor*>& sensors() const { return sensors_; }
 

@@ -191,6 +191,36 @@ TEST_F(CanBus, TheNewestFrameWinsAndIsStaleTheSecondTime) {
   EXPECT_EQ(again.time_ns, newest.time_ns);
 }
 
+// What the kernel kept of a long wait are the oldest frames.
+TEST_F(CanBus, NothingThatCameDuringAWaitIsNewAfterCatchingUp) {
+  Peer peer;
+  Bus bus("vcan0", false);
+  CommandSettings command = torque_command();
+  HealthRule state;
+  state.pattern = pattern_of(0x01);
+  state.signal = byte_at(4);
+  state.value = 8.0;
+  command.health = {state};
+  CanActuator actuator(bus, command);
+  FeedbackSettings angle = position_feedback();
+  angle.timeout_ns = 20'000'000;
+  CanSensor sensor(bus, angle);
+  bus.start();
+  EXPECT_EQ(sensor.read().fault, Fault::stale);
+  for (int n = 0; n < 20000; ++n) peer.send(float_frame(feedback_id, n));
+  bus.drain();
+  sensor.catch_up();
+  EXPECT_EQ(sensor.read().fault, Fault::stale);
+  EXPECT_GT(bus.counters().received, 0u);
+
+  peer.send(frame_of(0x01, {0, 0, 0, 0, 1, 0, 0, 0}));  // of before it was armed
+  bus.drain();
+  actuator.arm();
+  EXPECT_EQ(actuator.write(0.0).fault, Fault::none) << actuator.reason();
+  peer.send(float_frame(feedback_id, 7.0));
+  EXPECT_EQ(sensor.read().value, 7.0);
+}
+
 TEST_F(CanBus, ASampleIsAsOldAsItsFrameNotAsItsReading) {
   Peer peer;
   Bus bus("vcan0", false);
@@ -558,6 +588,43 @@ CommandSettings command_that_expects(const char* name) {
   return command;
 }
 
+TEST_F(CanBus, ANeutralStepIsRepeatedUntilTheDeviceAnswersAsItMust) {
+  int asked = 0;
+  AnsweringPeer device([&](const Frame& frame) -> std::vector<Frame> {
+    if (frame.id != command_id) return {};
+    return {frame_of(0x585, {static_cast<std::uint8_t>(++asked < 4 ? 0x00 : 0x0A)})};
+  });
+  Bus bus("vcan0", false);
+  CommandSettings command = torque_command();
+  command.keep_alive = {{frame_of(0x80, {}), 0}};
+  Step neutral;
+  neutral.name = "torque 0";
+  neutral.neutral = true;
+  neutral.expect.emplace();
+  neutral.expect->pattern = pattern_of(0x585, 1);
+  neutral.expect->pattern.require_byte(0, 0x0A);
+  neutral.expect->timeout_ns = 20'000'000;
+  neutral.repeats = 50;
+  command.arm = {neutral};
+  HealthRule mode;
+  mode.pattern = pattern_of(0x585, 1);
+  mode.signal = byte_at(0);
+  mode.value = 10.0;
+  command.health = {mode};
+  CanActuator actuator(bus, command);
+  bus.start();
+  Peer peer;
+  actuator.arm();
+  EXPECT_EQ(actuator.write(0.0).fault, Fault::none) << actuator.reason();
+  const std::vector<Frame> seen = peer.received();
+  ASSERT_GE(seen.size(), 4u);
+  std::vector<std::uint32_t> sent;
+  for (const Frame& frame : seen)
+    if (frame.id != 0x585) sent.push_back(frame.id);
+  for (std::size_t n = 0; n < sent.size(); ++n)
+    EXPECT_EQ(sent[n], n % 2 == 0 ? command_id : 0x80u) << "a SYNC with every one";
+}
+
 TEST_F(CanBus, AStartUpStepGoesOnWhenItIsAnswered) {
   AnsweringPeer device([](const Frame& frame) -> std::vector<Frame> {
     if (frame.id != 0x605) return {};
@@ -737,8 +804,8 @@ TEST_F(CanBus, APolledSensorAsksAtEveryRead) {
   });
   Bus bus("vcan0", false);
   FeedbackSettings feedback = position_feedback();
-  feedback.poll = frame_of(feedback_id, {});
-  feedback.poll->remote = true;
+  feedback.polls = {frame_of(feedback_id, {}), frame_of(0x055, {1})};
+  feedback.polls.front().remote = true;
   CanSensor sensor(bus, feedback);
   bus.start();
   EXPECT_EQ(sensor.read().fault, Fault::stale);
