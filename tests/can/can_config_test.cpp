@@ -279,18 +279,21 @@ TEST(CanConfig, RefusesConstantsThatTheirBitsCannotHold) {
   EXPECT_THAT(set("value = 256"),
               HasSubstr("value = 256: is outside what the signal can hold: 255 is the nearest"));
   EXPECT_THAT(set("type = \"int\", value = -129"), HasSubstr("-128 is the nearest"));
-  EXPECT_THAT(refusal(frame + "dbc = \"odrive-cansimple.dbc\"\n[[actuator.arm]]\nname = \"x\"\n"
-                              "id = 1\nexpect = [{ signal = \"Heartbeat.Axis_State\", "
-                              "value = 300 }]\n"),
-              HasSubstr("is outside what the signal can hold: 255"));
+  EXPECT_THAT(
+      refusal(
+          frame +
+          "[[actuator.arm]]\nname = \"x\"\n"
+          "id = 1\nexpect = [{ dbc = \"odrive-cansimple.dbc\", signal = \"Heartbeat.Axis_State\", "
+          "value = 300 }]\n"),
+      HasSubstr("is outside what the signal can hold: 255"));
 }
 
 TEST(CanConfig, TakesEveryPollAndOnlyPollsThatAskSomething) {
   const auto polls = [](const std::string& keys) {
     const auto file =
-        RigFile::parse("[sensor.s]\nid = 1\nlength = 8\nstart_bit = 0\n" + keys, "rig.toml");
+        RigFile::parse("[sensor]\nid = 1\nlength = 8\nstart_bit = 0\n" + keys, "rig.toml");
     ConfigReader reader(std::nullopt, 2);
-    return reader.feedback(Keys{file->section("sensor.s"), devices}).polls;
+    return reader.feedback(Keys{file->section("sensor"), devices}).polls;
   };
   EXPECT_EQ(polls("poll = [{ name = \"a\", id = 2 }, { name = \"b\", id = 3 }]\n").size(), 2u);
   EXPECT_THAT([&] { polls("poll = [{ name = \"a\" }]\n"); },

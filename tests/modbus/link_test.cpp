@@ -278,6 +278,50 @@ TEST(ModbusRelease, IsNotDoneWhileTheDeviceRefusesToBeDisarmed) {
   EXPECT_FALSE(rig.actuator->released());
 }
 
+TEST(ModbusDeadline, NothingIsAskedWhenNobodyWaitsForTheAnswer) {
+  sim::DriveSettings settings = drive_settings(false);
+  settings.turn_around_ns = 50'000'000;
+  const RunningDrive drive{settings};
+  LinkSettings apart;
+  apart.connection.host = "127.0.0.1";
+  apart.connection.port = drive.port();
+  apart.period_ns = generous_ns;
+  apart.response_timeout_ns = 1'000'000;
+  Link link{apart};
+  link.watch(number_at(16), "[sensor.torque]");
+  link.watch(number_at(34), "[sensor.position]");
+  link.open();
+  const std::uint64_t asked = link.counters().asked;
+  link.tick(std::nullopt);
+  while (link.pace().exchanges == 0) std::this_thread::yield();
+  EXPECT_EQ(link.counters().asked, asked + 1);
+  while (!link.fresh()) link.tick(std::nullopt);
+  EXPECT_EQ(link.newest().fields[0].fault, Fault::timeout);
+  EXPECT_EQ(link.newest().fields[1].fault, Fault::timeout);
+}
+
+// What was left of an exchange's time says nothing of how late an answer can be.
+TEST(ModbusDeadline, ALateAnswerIsWaitedForByTheTimeOutThatIsConfigured) {
+  sim::DriveSettings settings = drive_settings(true);
+  settings.faults.lost_fraction = 1.0;
+  const RunningDrive drive{settings};
+  ConnectionSettings connection;
+  connection.serial = true;
+  connection.device = line_path();
+  connection.baud = 1'000'000;
+  Transport transport{connection};
+  transport.set_usual_patience(generous_ns);
+  transport.connect();
+  Request question;
+  question.read_address = 16;
+  question.read_count = 4;
+  std::array<std::uint16_t, max_words> registers{};
+  const Answer hurried = transport.ask(question, monotonic_now_ns(), registers);
+  EXPECT_EQ(hurried.outcome, Outcome::timeout);
+  EXPECT_FALSE(hurried.withheld);
+  EXPECT_TRUE(transport.ask(question, monotonic_now_ns() + 1'000'000, registers).withheld);
+}
+
 // What the thread has done by itself since the last tick.
 void let_an_exchange_end(Rig& rig, std::size_t exchanges_before) {
   while (rig.link.pace().exchanges == exchanges_before) std::this_thread::yield();
