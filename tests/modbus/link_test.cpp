@@ -438,7 +438,8 @@ TEST_P(ModbusLink, AnExchangeThatLosesOneAnswerAndHoldsBackAnotherHasFailed) {
   link.open();
   const Pace pace = link.try_out(std::nullopt, 8);
   EXPECT_EQ(pace.exchanges, 8U);
-  EXPECT_EQ(pace.failed, 6U);  // 5 where what is held back hides what is lost
+  // A question that is not asked after a lost answer draws no lot: on TCP another sequence of them.
+  EXPECT_EQ(pace.failed, GetParam() ? 6U : 7U);
   EXPECT_THAT(obstacle(link, pace), HasSubstr("exchanges failed: "));
 }
 
