@@ -41,6 +41,9 @@ class Device {
   // somebody last looked, so that no read() returns it as new. Throws like open().
   virtual void catch_up() {}
 
+  // Outside the loop, after Actuator::release(): tries what that could not carry out.
+  virtual void keep_released() noexcept {}
+
   // Why a command had a fault or a sensor is no longer believed, for people; empty where there is
   // nothing to say.
   virtual std::string fault_reason() const { return {}; }

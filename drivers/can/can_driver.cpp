@@ -84,6 +84,10 @@ class CanDevice final : public Device {
     arm();
   }
 
+  void keep_released() noexcept override {
+    if (actuator_) actuator_->release();
+  }
+
   void catch_up() override {
     for (const auto& bus : buses_) bus->drain();
     for (const auto& sensor : sensors_) sensor->catch_up();

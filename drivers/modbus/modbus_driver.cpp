@@ -73,6 +73,10 @@ class ModbusDevice final : public Device {
     actuator_->arm();
   }
 
+  void keep_released() noexcept override {
+    if (actuator_) actuator_->release();
+  }
+
   void catch_up() override {
     for (const auto& link : links_) link->forget();
   }

@@ -84,6 +84,10 @@ void ConfiguredRig::arm() {
   for (Part& part : parts_) part.device->catch_up();
 }
 
+void ConfiguredRig::keep_released() noexcept {
+  for (Part& part : parts_) part.device->keep_released();
+}
+
 std::string ConfiguredRig::arm_again() {
   try {
     for (Part& part : parts_) part.device->rearm();
