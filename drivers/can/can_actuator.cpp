@@ -64,6 +64,7 @@ Sample CanActuator::write(double command) noexcept {
   compose(std::isfinite(command) ? command : settings_.neutral);
   const std::int64_t now_ns = monotonic_ns();
   last_result_ = bus_.send(frame_);
+  last_state_ = bus_.state();
   if (last_result_ == SendResult::sent) {
     held_.value = encoded_;
     held_.time_ns = now_ns;
@@ -121,7 +122,7 @@ std::string CanActuator::reason() const {
     case SendResult::sent: return "";
     case SendResult::queue_full:
       return bus_.interface() + ": the transmit queue is full, the command was dropped";
-    default: return bus_.interface() + ": " + to_string(bus_.state());
+    default: return bus_.interface() + ": " + to_string(last_state_);
   }
 }
 

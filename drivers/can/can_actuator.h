@@ -69,6 +69,7 @@ class CanActuator final : public Actuator {
   Sample held_;
   const HealthRule* violated_ = nullptr;
   SendResult last_result_ = SendResult::sent;
+  BusState last_state_ = BusState::up;  // then: a release may outlast what was wrong
   bool started_ = false;
   bool released_ = true;
 };

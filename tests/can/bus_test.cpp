@@ -472,6 +472,7 @@ TEST_F(CanBus, ReleaseOutlastsABusOffWithTheUsualRestart) {
   actuator.write(1.0);
   peer.received();
   Peer::inject_error(CAN_ERR_BUSOFF);
+  EXPECT_EQ(actuator.write(1.0).fault, Fault::bus);
   std::thread controller([] {
     usleep(100'000);
     Peer::inject_error(CAN_ERR_RESTARTED);
@@ -479,6 +480,7 @@ TEST_F(CanBus, ReleaseOutlastsABusOffWithTheUsualRestart) {
   actuator.release();
   controller.join();
   EXPECT_TRUE(actuator.released());
+  EXPECT_THAT(actuator.reason(), HasSubstr("bus-off")) << "what it was, not what it is";
   EXPECT_THAT(peer.received(),
               testing::ElementsAre(float_frame(command_id, 0.0), frame_of(0x07, {1})));
 }
