@@ -37,6 +37,13 @@ class Device {
   // settings in a power cut meanwhile. Throws like open().
   virtual void rearm() { arm(); }
 
+  // After all devices of the rig are armed, right before the loop: takes in what has arrived since
+  // somebody last looked, so that no read() returns it as new. Throws like open().
+  virtual void catch_up() {}
+
+  // Outside the loop, after Actuator::release(): tries what that could not carry out.
+  virtual void keep_released() noexcept {}
+
   // Why a command had a fault or a sensor is no longer believed, for people; empty where there is
   // nothing to say.
   virtual std::string fault_reason() const { return {}; }
@@ -44,6 +51,11 @@ class Device {
   // Whether a sensor is one whose response is wanted unless [sweep] responses says otherwise; an
   // interlock is not.
   virtual bool measures(std::size_t /*sensor*/) const { return true; }
+
+  // Whether a sensor has something new only as the answer to a command: it is silent while the rig
+  // is only looked at.
+  virtual bool answers_command(std::size_t /*sensor*/) const { return false; }
+
   // Exchanges, losses, obstacles so far; not for the loop.
   virtual std::vector<Remark> remarks() const { return {}; }
 

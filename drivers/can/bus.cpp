@@ -31,7 +31,7 @@ void Bus::start() {
   socket_.set_filters(filters);
 }
 
-void Bus::poll() noexcept {
+bool Bus::poll() noexcept {
   if (state_ == BusState::gone) try_to_rebind();
   Received received;
   for (int n = 0; n < max_frames_per_poll; ++n) {
@@ -40,8 +40,15 @@ void Bus::poll() noexcept {
       case ReceiveResult::error_frame: note_error(received.error_class); break;
       case ReceiveResult::link_down: state_ = BusState::link_down; break;
       case ReceiveResult::gone: state_ = BusState::gone; break;
-      case ReceiveResult::nothing: counters_.overflows = socket_.overflows(); return;
+      case ReceiveResult::nothing: counters_.overflows = socket_.overflows(); return true;
     }
+  }
+  return false;
+}
+
+void Bus::drain() noexcept {
+  constexpr int longest_queue = 64;  // of net.core.rmem_max raised to tens of megabytes
+  for (int n = 0; n < longest_queue && !poll(); ++n) {
   }
 }
 
@@ -102,6 +109,11 @@ SendResult Bus::send(const Frame& frame) noexcept {
     case SendResult::failed: ++counters_.dropped_dead; break;
   }
   return result;
+}
+
+void Bus::reserve(Room room) noexcept {
+  constexpr std::size_t for_lists = 128;
+  socket_.set_send_room(room == Room::lists ? for_lists : 2 * frames_per_tick_);
 }
 
 void Bus::wait_and_poll(std::int64_t timeout_ns) noexcept {

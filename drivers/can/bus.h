@@ -48,12 +48,26 @@ class Bus {
   // Tells the kernel which frames are wanted. Again after later listen()s.
   void start();
 
-  // Takes in everything that has arrived, at most `max_frames_per_poll` frames.
-  void poll() noexcept SINERIG_NONBLOCKING;
+  // Takes in everything that has arrived, at most `max_frames_per_poll` frames; false where more
+  // may wait.
+  bool poll() noexcept SINERIG_NONBLOCKING;
+
+  // All that has arrived while nobody looked. The kernel's queue keeps the oldest: what was sent
+  // after it was full is not there. Not for the loop.
+  void drain() noexcept;
 
   // Sends at once or never. On a dead bus nothing is tried: frames left in its queue would all go
   // out, late, when it comes back.
   SendResult send(const Frame& frame) noexcept SINERIG_NONBLOCKING;
+
+  // How many frames may wait for the wire: in the loop a few, because a bus that nobody
+  // acknowledges keeps them and sends them, old as they are, when the cable is back; for lists as
+  // many as come, so that neutral and disarm line up behind those. Not for the loop.
+  enum class Room : std::uint8_t { set_points, lists };
+  void reserve(Room room) noexcept;
+
+  // Frames that somebody sends at every tick. Before the loop.
+  void plan_to_send(std::size_t frames_per_tick) noexcept { frames_per_tick_ += frames_per_tick; }
 
   // poll() after waiting for something to arrive. Not for the loop.
   void wait_and_poll(std::int64_t timeout_ns) noexcept;
@@ -76,6 +90,7 @@ class Bus {
   BusState state_ = BusState::up;
   BusCounters counters_;
   std::int64_t next_rebind_ns_ = 0;
+  std::size_t frames_per_tick_ = 0;
 };
 
 }  // namespace sinerig::can

@@ -13,18 +13,30 @@ CanActuator::CanActuator(Bus& bus, CommandSettings settings)
   check(frame_);
   check(settings_.signal, frame_.length);
   check(settings_.checksum, frame_.length);
+  compose(settings_.neutral);
   for (Sequence* list :
-       {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown})
+       {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown}) {
+    for (Step& step : *list) {
+      if (!step.neutral) continue;
+      step.frame = frame_;
+      for (const KeepAlive& kept : settings_.keep_alive)
+        if (kept.period_ns == 0) step.company.push_back(kept.frame);
+    }
     listen_for(bus_, *list);
+  }
+  bus_.plan_to_send(1 + settings_.keep_alive.size());
   held_.value = settings_.neutral;
 }
 
 CanActuator::~CanActuator() {
   release();
-  if (started_) run_all(bus_, settings_.shutdown);
+  Patience patience;
+  if (started_) run_all(bus_, settings_.shutdown, patience);
 }
 
+// A drive that could not be told to stop is told first: its start-up list does not say so.
 void CanActuator::start() {
+  release();
   started_ = true;
   run(bus_, settings_.startup, "start-up");
 }
@@ -32,15 +44,17 @@ void CanActuator::start() {
 // Neutral goes out before the drive is armed: one that finds a stale set-point would jump.
 void CanActuator::arm() {
   released_ = false;
+  bus_.reserve(Bus::Room::lists);
   try {
-    compose(settings_.neutral);
-    send_surely(bus_, frame_);
+    Patience patience;
+    send_neutral(patience);
     run(bus_, settings_.arm, "arm");
   } catch (...) {
     release();
     throw;
   }
   health_.begin();
+  bus_.reserve(Bus::Room::set_points);
 }
 
 Sample CanActuator::write(double command) noexcept {
@@ -50,6 +64,7 @@ Sample CanActuator::write(double command) noexcept {
   compose(std::isfinite(command) ? command : settings_.neutral);
   const std::int64_t now_ns = monotonic_ns();
   last_result_ = bus_.send(frame_);
+  last_state_ = bus_.state();
   if (last_result_ == SendResult::sent) {
     held_.value = encoded_;
     held_.time_ns = now_ns;
@@ -77,12 +92,28 @@ void CanActuator::keep_alive(std::int64_t now_ns) noexcept {
   }
 }
 
+// A device may take a set-point only with the SYNC that comes with every one.
+bool CanActuator::send_neutral(Patience& patience) noexcept {
+  compose(settings_.neutral);
+  bool all = send_surely(bus_, frame_, patience) == SendResult::sent;
+  if (all) held_.value = encoded_;
+  for (const KeepAlive& kept : settings_.keep_alive) {
+    if (kept.period_ns > 0) continue;
+    all = send_surely(bus_, kept.frame, patience) == SendResult::sent && all;
+  }
+  return all;
+}
+
 void CanActuator::release() noexcept {
   if (released_) return;
-  released_ = true;
-  compose(settings_.neutral);
-  if (send_surely(bus_, frame_) == SendResult::sent) held_.value = encoded_;
-  run_all(bus_, settings_.disarm);
+  bus_.poll();  // what happened to the bus since the last tick
+  bus_.reserve(Bus::Room::lists);
+  Patience patience;
+  const bool neutral = send_neutral(patience);
+  const bool disarmed = run_all(bus_, settings_.disarm, patience) == 0;
+  bus_.poll();
+  // A bus that died meanwhile has thrown away what waited in its queue.
+  released_ = neutral && disarmed && bus_.state() == BusState::up;
 }
 
 std::string CanActuator::reason() const {
@@ -91,7 +122,7 @@ std::string CanActuator::reason() const {
     case SendResult::sent: return "";
     case SendResult::queue_full:
       return bus_.interface() + ": the transmit queue is full, the command was dropped";
-    default: return bus_.interface() + ": " + to_string(bus_.state());
+    default: return bus_.interface() + ": " + to_string(last_state_);
   }
 }
 

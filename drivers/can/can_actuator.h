@@ -46,8 +46,11 @@ class CanActuator final : public Actuator {
   // must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
-  // Neutral command, then the disarm list. What cannot be sent is tried for 20 ms per frame.
+  // Neutral command, then the disarm list. What finds the queue full is tried for 20 ms per frame,
+  // a dead bus for 0.3 s in all. What then has not gone out is tried again by the next release(),
+  // by start() and by the destructor.
   void release() noexcept override;
+  bool released() const noexcept { return released_; }
 
   // Why the last write() had a fault, for people; empty when it had none. Not for the loop.
   std::string reason() const;
@@ -55,6 +58,7 @@ class CanActuator final : public Actuator {
  private:
   void compose(double command) noexcept SINERIG_NONBLOCKING;
   void keep_alive(std::int64_t now_ns) noexcept SINERIG_NONBLOCKING;
+  bool send_neutral(Patience& patience) noexcept;
 
   Bus& bus_;
   CommandSettings settings_;
@@ -65,6 +69,7 @@ class CanActuator final : public Actuator {
   Sample held_;
   const HealthRule* violated_ = nullptr;
   SendResult last_result_ = SendResult::sent;
+  BusState last_state_ = BusState::up;  // then: a release may outlast what was wrong
   bool started_ = false;
   bool released_ = true;
 };

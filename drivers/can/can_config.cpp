@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 #include <utility>
 
 namespace sinerig::can {
@@ -30,17 +31,30 @@ const Dbc& ConfigReader::dbc(const Keys& keys) {
   });
 }
 
+// 29 bit where it says so, or where it needs them and the device goes by that.
+bool ConfigReader::is_extended(const Keys& keys, std::string_view key, std::uint32_t id,
+                               std::string_view step_key) const {
+  if (keys.has(key)) return keys.at(key).flag(key, false);
+  const Keys& holder = holder_of("extended_by_id", keys);
+  return holder.at("extended_by_id").flag("extended_by_id", false) &&
+         moved(keys, id, step_key) > max_standard_id;
+}
+
+std::uint64_t ConfigReader::moved(const Keys& keys, std::uint32_t id,
+                                  std::string_view step_key) const {
+  const std::string_view given = keys.has(step_key) ? step_key : "node_step";
+  return id + static_cast<std::uint64_t>(holder_of(given, keys).integer(given, an_id, 0)) * node_;
+}
+
 std::uint32_t ConfigReader::shifted(const Keys& keys, std::string_view key, std::uint32_t id,
                                     bool extended, std::string_view step_key) const {
-  const std::string_view given = keys.has(step_key) ? step_key : "node_step";
-  const auto step = static_cast<std::uint64_t>(holder_of(given, keys).integer(given, an_id, 0));
-  const std::uint64_t moved = id + step * node_;
+  const std::uint64_t shifted_id = moved(keys, id, step_key);
   const std::uint32_t highest = extended ? max_extended_id : max_standard_id;
-  if (moved > highest)
-    keys.refuse(key, "identifier " + std::to_string(moved) +
+  if (shifted_id > highest)
+    keys.refuse(key, "identifier " + std::to_string(shifted_id) +
                          " (with node_step · node added) is above " + id_text(highest, extended) +
                          (extended ? "" : "; extended = true makes it a 29-bit one"));
-  return static_cast<std::uint32_t>(moved);
+  return static_cast<std::uint32_t>(shifted_id);
 }
 
 Frame ConfigReader::frame_of_message(const Keys& keys, const DbcMessage& message) const {
@@ -56,9 +70,9 @@ Frame ConfigReader::frame_of_message(const Keys& keys, const DbcMessage& message
 // A frame given in place: id, bytes or length, flags.
 Frame ConfigReader::frame(const Keys& keys) {
   Frame frame;
-  frame.extended = keys.at("extended").flag("extended", false);
-  frame.id =
-      shifted(keys, "id", static_cast<std::uint32_t>(keys.integer("id", an_id)), frame.extended);
+  const auto id = static_cast<std::uint32_t>(keys.integer("id", an_id));
+  frame.extended = is_extended(keys, "extended", id, "node_step");
+  frame.id = shifted(keys, "id", id, frame.extended);
   frame.fd = keys.at("fd").flag("fd", false);
   frame.bit_rate_switch = frame.fd && keys.at("bit_rate_switch").flag("bit_rate_switch", false);
   frame.remote = keys.at("remote").flag("remote", false);
@@ -161,8 +175,21 @@ void ConfigReader::fill(const Keys& keys, Frame& frame, bool by_name) {
       signal = layout(entry);
       at_key(entry, "start_bit", [&] { check(signal, frame.length); });
     }
-    encode(frame.payload(), signal, entry.at("value").number("value", any_number));
+    put_value(entry, frame, signal);
   }
+}
+
+// Rounded to the nearest code; one that is not near is a mistake, not a set-point to be clamped.
+void ConfigReader::put_value(const Keys& entry, Frame& frame, const Signal& signal) {
+  const double value = entry.at("value").number("value", any_number);
+  const double held = encode(frame.payload(), signal, value);
+  const bool is_float =
+      signal.encoding == Encoding::float32 || signal.encoding == Encoding::float64;
+  const double rounding = is_float ? 1e-6 * std::abs(value) : 0.500001 * std::abs(signal.scale);
+  if (std::abs(held - value) <= rounding) return;
+  std::ostringstream rule;
+  rule << "is outside what the signal can hold: " << held << " is the nearest";
+  entry.refuse("value", rule.str());
 }
 
 Checksum ConfigReader::checksum(const Keys& keys, std::size_t bytes) const {

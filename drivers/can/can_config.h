@@ -44,6 +44,7 @@ class ConfigReader {
   Frame frame(const Keys& keys);
   Frame frame_of_message(const Keys& keys, const DbcMessage& message) const;
   void fill(const Keys& keys, Frame& frame, bool by_name);
+  static void put_value(const Keys& entry, Frame& frame, const Signal& signal);
   Checksum checksum(const Keys& keys, std::size_t bytes) const;
   void require_bytes(const Keys& keys, std::string_view key, Pattern& pattern) const;
   Pattern expected(const Keys& keys);
@@ -54,6 +55,10 @@ class ConfigReader {
   const Dbc& dbc(const Keys& keys);
   std::uint32_t shifted(const Keys& keys, std::string_view key, std::uint32_t id, bool extended,
                         std::string_view step_key = "node_step") const;
+
+  bool is_extended(const Keys& keys, std::string_view key, std::uint32_t id,
+                   std::string_view step_key) const;
+  std::uint64_t moved(const Keys& keys, std::uint32_t id, std::string_view step_key) const;
 
   // Who has `key`: the channel if it does, else the device it belongs to.
   const Keys& holder_of(std::string_view key, const Keys& keys) const {

@@ -54,7 +54,7 @@ class CanDevice final : public Device {
       feedback.settings = read<FeedbackSettings>(
           sensor->section, "feedback",
           [](ConfigReader& reader, const Keys& keys) { return reader.feedback(keys); });
-      const bool polls_fd = feedback.settings.poll && feedback.settings.poll->fd;
+      const bool polls_fd = std::ranges::any_of(feedback.settings.polls, &Frame::fd);
       feedback.interface = interface_of(sensor->section, feedback.settings.fd || polls_fd);
       feedback_.push_back(std::move(feedback));
     }
@@ -71,14 +71,30 @@ class CanDevice final : public Device {
     if (actuator_) actuator_->start();
   }
 
+  // What came while nobody looked is no answer and tells nothing of the device's health.
   void arm() override {
+    for (const auto& bus : buses_) bus->drain();
     if (actuator_) actuator_->arm();
   }
 
   void rearm() override {
+    for (const auto& bus : buses_) bus->drain();
     if (!actuator_) return;
     actuator_->start();
-    actuator_->arm();
+    arm();
+  }
+
+  void keep_released() noexcept override {
+    if (actuator_) actuator_->release();
+  }
+
+  void catch_up() override {
+    for (const auto& bus : buses_) bus->drain();
+    for (const auto& sensor : sensors_) sensor->catch_up();
+  }
+
+  bool answers_command(std::size_t index) const override {
+    return feedback_[index].settings.answers_command;
   }
 
   Actuator* actuator() noexcept override { return actuator_ ? &*actuator_ : nullptr; }
@@ -123,7 +139,9 @@ class CanDevice final : public Device {
                                  [](const Step& step) { return step.frame && step.frame->fd; });
     };
     return settings.frame.fd || has_fd(settings.startup) || has_fd(settings.arm) ||
-           has_fd(settings.disarm) || has_fd(settings.shutdown);
+           has_fd(settings.disarm) || has_fd(settings.shutdown) ||
+           std::ranges::any_of(settings.keep_alive,
+                               [](const KeepAlive& kept) { return kept.frame.fd; });
   }
 
   std::size_t interface_of(const Section& section, bool fd) {

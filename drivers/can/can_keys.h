@@ -48,6 +48,16 @@ class Keys {
       tables.emplace_back(table, folder_of(key));
     return tables;
   }
+  // Both, the profile's first: what a profile's channel needs is not lost by a list in the rig
+  // file.
+  std::vector<Keys> joined_tables(std::string_view key) const {
+    std::vector<Keys> tables;
+    for (const config::Section& table : base_.tables(key)) tables.emplace_back(table, base_folder_);
+    if (!over_) return tables;
+    for (const config::Section& table : over_->tables(key))
+      tables.emplace_back(table, over_folder_);
+    return tables;
+  }
   [[noreturn]] void refuse(std::string_view key, std::string_view rule) const {
     at(key).refuse(key, rule);
   }

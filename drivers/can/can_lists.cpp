@@ -16,20 +16,13 @@ std::int64_t nanoseconds(double seconds) {
   return std::llround(seconds * 1e9);
 }
 
-std::uint64_t raw_of(const Signal& signal, double value) {
-  Frame scratch;
-  scratch.length = max_fd_bytes;
-  encode(scratch.payload(), signal, value);
-  return extract_raw(scratch.payload(), signal);
-}
-
 }  // namespace
 
 Pattern ConfigReader::expected(const Keys& keys) {
   Pattern pattern;
   if (keys.has("expect_id")) {
-    pattern.extended = keys.at("expect_extended").flag("expect_extended", false);
     const auto id = static_cast<std::uint32_t>(keys.integer("expect_id", an_id));
+    pattern.extended = is_extended(keys, "expect_extended", id, "expect_node_step");
     pattern.id = shifted(keys, "expect_id", id, pattern.extended, "expect_node_step");
     require_bytes(keys, "expect_bytes", pattern);
     return pattern;
@@ -38,8 +31,10 @@ Pattern ConfigReader::expected(const Keys& keys) {
     const Place found = place_by_name(entry);
     pattern.id = found.frame.id;
     pattern.extended = found.frame.extended;
-    pattern.require(found.signal,
-                    raw_of(found.signal, entry.at("value").number("value", any_number)));
+    Frame scratch;
+    scratch.length = max_fd_bytes;
+    put_value(entry, scratch, found.signal);
+    pattern.require(found.signal, extract_raw(scratch.payload(), found.signal));
   }
   return pattern;
 }
@@ -47,6 +42,9 @@ Pattern ConfigReader::expected(const Keys& keys) {
 Step ConfigReader::step(const Keys& keys) {
   Step step;
   step.name = keys.at("name").text("name");
+  step.neutral = keys.at("neutral").flag("neutral", false);
+  if (step.neutral && (keys.has("id") || keys.has("message") || keys.has("set")))
+    keys.refuse("neutral", "sends the channel's set-point; give no frame beside it");
   if (keys.has("id")) {
     step.frame = frame(keys);
     fill(keys, *step.frame, false);
@@ -82,12 +80,12 @@ Step ConfigReader::step(const Keys& keys) {
   return step;
 }
 
-// The device's part of a list comes first, the channel's after it.
+// The device's part of a list comes first, then that of the profile's channel, then the rig's.
 Sequence ConfigReader::sequence(const Keys& keys, std::string_view list) {
   Sequence sequence;
   if (device_)
-    for (const Keys& entry : device_->tables(list)) sequence.push_back(step(entry));
-  for (const Keys& entry : keys.tables(list)) sequence.push_back(step(entry));
+    for (const Keys& entry : device_->joined_tables(list)) sequence.push_back(step(entry));
+  for (const Keys& entry : keys.joined_tables(list)) sequence.push_back(step(entry));
   return sequence;
 }
 
@@ -116,13 +114,13 @@ HealthRule ConfigReader::health(const Keys& keys) {
 }
 
 void ConfigReader::watch(const Keys& keys, CommandSettings& settings) {
-  for (const Keys& entry : keys.tables("keep_alive")) {
+  for (const Keys& entry : keys.joined_tables("keep_alive")) {
     const Step sent = step(entry);
     if (!sent.frame) entry.refuse("name", "needs a frame: id, message or set");
     const double period_s = entry.at("period_s").number("period_s", zero_or_more);
     settings.keep_alive.push_back({*sent.frame, nanoseconds(period_s)});
   }
-  for (const Keys& entry : keys.tables("health")) settings.health.push_back(health(entry));
+  for (const Keys& entry : keys.joined_tables("health")) settings.health.push_back(health(entry));
 }
 
 CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
@@ -165,7 +163,12 @@ FeedbackSettings ConfigReader::feedback(const Keys& keys) {
     settings.invalid_raw = static_cast<std::uint64_t>(
         keys.integer("invalid", {.min = 0.0, .max = 9007199254740992.0}));
   settings.timeout_ns = nanoseconds(keys.number("timeout_s", zero_or_more, 0.0));
-  for (const Keys& entry : keys.tables("poll")) settings.poll = step(entry).frame;
+  settings.answers_command = keys.at("answers_command").flag("answers_command", false);
+  for (const Keys& entry : keys.tables("poll")) {
+    const Step asked = step(entry);
+    if (!asked.frame) entry.refuse("name", "needs a frame: id, message or set");
+    settings.polls.push_back(*asked.frame);
+  }
   return settings;
 }
 

@@ -8,10 +8,11 @@ CanSensor::CanSensor(Bus& bus, const FeedbackSettings& settings)
     : bus_(bus), settings_(settings), slot_(0), unwrapper_(settings.signal.wrap_modulus) {
   check(settings_.signal, settings_.pattern.minimum_length);
   slot_ = bus_.listen(settings_.pattern, settings_.checksum);
+  bus_.plan_to_send(settings_.polls.size());
 }
 
 Sample CanSensor::read() noexcept {
-  if (settings_.poll) bus_.send(*settings_.poll);
+  for (const Frame& question : settings_.polls) bus_.send(question);
   bus_.poll();
   const Slot& slot = bus_.slot(slot_);
   const bool spoiled = slot.spoiled != seen_spoiled_;
@@ -27,6 +28,19 @@ Sample CanSensor::read() noexcept {
     return last_;
   }
 
+  take_in(slot);
+  return last_;
+}
+
+void CanSensor::catch_up() noexcept {
+  const Slot& slot = bus_.slot(slot_);
+  seen_spoiled_ = slot.spoiled;
+  if (slot.count != seen_count_) take_in(slot);  // its angle goes on from there
+  silent_since_ns_ = 0;
+  last_.fault = Fault::stale;
+}
+
+void CanSensor::take_in(const Slot& slot) noexcept {
   seen_count_ = slot.count;
   silent_since_ns_ = slot.time_ns;
   const auto payload = slot.frame.payload();
@@ -37,7 +51,6 @@ Sample CanSensor::read() noexcept {
   last_.time_ns = slot.time_ns;
   last_.fault = invalid ? Fault::range : Fault::none;
   if (!invalid) last_.value = unwrapper_.apply(value);
-  return last_;
 }
 
 }  // namespace sinerig::can

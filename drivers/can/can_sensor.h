@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "drivers/can/bus.h"
 #include "drivers/driver.h"
@@ -16,7 +17,8 @@ struct FeedbackSettings {
   std::optional<std::uint64_t> invalid_raw;  // the code that means "no value"
   std::int64_t timeout_ns = 0;               // silence longer than this is a time-out; 0 = never
   bool fd = false;                           // comes as a CAN-FD frame
-  std::optional<Frame> poll;                 // asked at every read; the answer comes at a later one
+  std::vector<Frame> polls;                  // sent at every read; answers come at a later one
+  bool answers_command = false;              // comes only as the answer to a set-point
 };
 
 class CanSensor final : public Sensor {
@@ -30,7 +32,12 @@ class CanSensor final : public Sensor {
   // Fault::range: the device says that it has no value.
   Sample read() noexcept SINERIG_NONBLOCKING override;
 
+  // What has come so far is not new to the next read(), and no silence either. After Bus::drain().
+  void catch_up() noexcept;
+
  private:
+  void take_in(const Slot& slot) noexcept SINERIG_NONBLOCKING;
+
   Bus& bus_;
   FeedbackSettings settings_;
   std::size_t slot_;

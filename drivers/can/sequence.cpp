@@ -20,14 +20,17 @@ void pause_for(std::int64_t time_ns) noexcept {
 
 // The answer counts only if it comes after the frame: what lay in the socket before is taken in
 // first.
-Outcome run_once(Bus& bus, const Step& step) noexcept {
-  bus.poll();
+Outcome run_once(Bus& bus, const Step& step, Patience& patience) noexcept {
+  bus.drain();
   const bool expects = step.expect.has_value();
   const std::uint64_t answers = expects ? bus.slot(step.expect->slot).count : 0;
   const bool refusable = expects && step.expect->refusal.has_value();
   const std::uint64_t refusals = refusable ? bus.slot(step.expect->refusal_slot).count : 0;
 
-  if (step.frame && send_surely(bus, *step.frame) != SendResult::sent) return Outcome::not_sent;
+  if (step.frame && send_surely(bus, *step.frame, patience) != SendResult::sent)
+    return Outcome::not_sent;
+  for (const Frame& frame : step.company)
+    if (send_surely(bus, frame, patience) != SendResult::sent) return Outcome::not_sent;
   if (!expects) return Outcome::done;
 
   const std::int64_t deadline_ns = monotonic_ns() + step.expect->timeout_ns;
@@ -40,10 +43,10 @@ Outcome run_once(Bus& bus, const Step& step) noexcept {
   }
 }
 
-Outcome run_step(Bus& bus, const Step& step) noexcept {
+Outcome run_step(Bus& bus, const Step& step, Patience& patience) noexcept {
   Outcome outcome = Outcome::no_answer;
   for (std::uint32_t n = 0; n < step.repeats && outcome == Outcome::no_answer; ++n)
-    outcome = run_once(bus, step);
+    outcome = run_once(bus, step, patience);
   if (step.delay_ns > 0) pause_for(step.delay_ns);
   return outcome;
 }
@@ -70,8 +73,9 @@ void listen_for(Bus& bus, Sequence& sequence) {
 }
 
 void run(Bus& bus, const Sequence& sequence, const std::string& list_name) {
+  Patience patience;
   for (const Step& step : sequence) {
-    const Outcome outcome = run_step(bus, step);
+    const Outcome outcome = run_step(bus, step, patience);
     if (outcome == Outcome::done) continue;
     std::ostringstream message;
     message << bus.interface() << ": " << list_name << " step '" << step.name << "' ";
@@ -100,18 +104,25 @@ void run(Bus& bus, const Sequence& sequence, const std::string& list_name) {
   }
 }
 
-int run_all(Bus& bus, const Sequence& sequence) noexcept {
+int run_all(Bus& bus, const Sequence& sequence, Patience& patience) noexcept {
   int failed = 0;
   for (const Step& step : sequence)
-    if (run_step(bus, step) != Outcome::done) ++failed;
+    if (run_step(bus, step, patience) != Outcome::done) ++failed;
   return failed;
 }
 
-SendResult send_surely(Bus& bus, const Frame& frame) noexcept {
+// Time is counted, not read: every turn sleeps, whatever poll() finds.
+SendResult send_surely(Bus& bus, const Frame& frame, Patience& patience) noexcept {
+  Patience for_room{.left_ns = retry_for_ns};
   SendResult result = bus.send(frame);
-  for (std::int64_t waited_ns = 0; result == SendResult::queue_full && waited_ns < retry_for_ns;
-       waited_ns += retry_pause_ns) {
+  while (result != SendResult::sent) {
+    const bool full = result == SendResult::queue_full;
+    if (!full && bus.state() == BusState::up) break;  // such a frame never goes
+    Patience& limit = full ? for_room : patience;
+    if (limit.left_ns <= 0) break;
+    limit.left_ns -= retry_pause_ns;
     pause_for(retry_pause_ns);
+    bus.poll();  // tells when a dead bus is back
     result = bus.send(frame);
   }
   return result;

@@ -204,6 +204,13 @@ bool Socket::rebind() noexcept {
   return bind_to(fd_, interface_) && apply_filters();
 }
 
+// The kernel charges a frame, FD or not, with up to 960 bytes, and doubles what is
+// asked for.
+void Socket::set_send_room(std::size_t frames) noexcept {
+  const int bytes = static_cast<int>(frames * 1024 / 2);
+  setsockopt(fd_, SOL_SOCKET, SO_SNDBUF, &bytes, sizeof bytes);
+}
+
 void Socket::wait(std::int64_t timeout_ns) const noexcept {
   pollfd waiting{fd_, POLLIN, 0};
   const timespec timeout{timeout_ns / 1'000'000'000, timeout_ns % 1'000'000'000};

@@ -57,6 +57,10 @@ class Socket {
   // filters (the kernel forgets them together with the interface).
   bool rebind() noexcept;
 
+  // Lets about so many frames of this socket wait for the wire, at least the kernel's least (4 to
+  // 11): one more is SendResult::queue_full. Not for the loop.
+  void set_send_room(std::size_t frames) noexcept;
+
   // Waits until a frame can be received or the time is up. Not for the loop.
   void wait(std::int64_t timeout_ns) const noexcept;
 

@@ -49,6 +49,14 @@ Sample Encoder::read() noexcept {
   return last_;
 }
 
+// The kernel's queue is shorter than `capacity`: one read empties it. An edge younger than the lag
+// waits for the loop.
+void Encoder::catch_up() {
+  read();
+  if (gone_) throw std::runtime_error("the lines of the encoder can no longer be read");
+  forgiven_ = all_errors();
+}
+
 // The kernel queues each line's edges from a thread of its own: neighbours may have changed places.
 bool Encoder::gather() noexcept {
   const auto taken = lines_->take(std::span{waiting_}.subspan(waiting_count_));

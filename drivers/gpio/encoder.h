@@ -35,6 +35,10 @@ class Encoder final : public Sensor {
   // gone. Fault::stale: no edge since the last read (Samples::edge).
   Sample read() noexcept SINERIG_NONBLOCKING override;
 
+  // Counts what has come while nobody looked; what was wrong so far is forgiven. Where edges were
+  // lost, the position goes on from a wrong place. Throws std::runtime_error: the lines are gone.
+  void catch_up();
+
   std::int64_t count() const noexcept { return decoder_.count(); }
   std::uint64_t illegal() const noexcept { return decoder_.illegal(); }
   std::uint64_t lost() const noexcept { return lost_; }  // overflow of the kernel's queue
@@ -48,7 +52,8 @@ class Encoder final : public Sensor {
 
   bool gather() noexcept SINERIG_NONBLOCKING;
   void count_until(std::int64_t time_ns) noexcept SINERIG_NONBLOCKING;
-  std::uint64_t errors() const noexcept { return decoder_.illegal() + lost_; }
+  std::uint64_t all_errors() const noexcept { return decoder_.illegal() + lost_; }
+  std::uint64_t errors() const noexcept { return all_errors() - forgiven_; }
 
   std::unique_ptr<EdgeLines> lines_;
   EncoderSettings settings_;
@@ -58,6 +63,7 @@ class Encoder final : public Sensor {
   std::size_t waiting_count_ = 0;
   std::uint32_t next_sequence_ = 1;
   std::uint64_t lost_ = 0;
+  std::uint64_t forgiven_ = 0;  // errors before the last catch_up()
   std::uint64_t late_ = 0;
   bool gone_ = false;
   bool crossed_ = false;  // an edge was counted by this read

@@ -36,6 +36,11 @@ class GpioDevice final : public Device {
     }
   }
 
+  void catch_up() override {
+    for (const Input& input : inputs_)
+      if (input.encoder != nullptr) input.encoder->catch_up();
+  }
+
   std::string fault_reason() const override {
     for (const Input& input : inputs_) {
       const std::string reason = input.encoder != nullptr ? input.encoder->reason() : "";

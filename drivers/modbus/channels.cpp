@@ -71,7 +71,9 @@ ModbusActuator::~ModbusActuator() {
   });
 }
 
+// A drive that could not be told to stop is told first: its start-up list does not say so.
 void ModbusActuator::start() {
+  release();
   started_ = true;
   link_.idle([&](Transport& transport) { run(transport, settings_.startup, "start-up"); });
 }
@@ -92,7 +94,13 @@ void ModbusActuator::arm() {
     throw;
   }
   link_.set_commanded(true);
-  confirmed_ns_ = monotonic_now_ns();
+  ages_begin_ = true;
+}
+
+// Between arm() and the first tick the sweep file is made: that is no silence of the device.
+void ModbusActuator::begin_ages() noexcept {
+  ages_begin_ = false;
+  confirmed_ns_ = link_.tick_ns();
   for (Sample& reading : health_)
     reading = {.value = 0.0, .time_ns = confirmed_ns_, .fault = Fault::stale};
 }
@@ -103,6 +111,7 @@ Sample ModbusActuator::write(double command) noexcept {
   const bool a_number = std::isfinite(command);
   link_.tick(
       std::clamp(a_number ? command : settings_.neutral, settings_.minimum, settings_.maximum));
+  if (ages_begin_) begin_ages();
   last_fault_ = judge();
   look_after_health();
   if (violated_ != no_rule) last_fault_ = Fault::device;
@@ -153,8 +162,9 @@ void ModbusActuator::look_after_health() noexcept {
 
 void ModbusActuator::release() noexcept {
   if (released_) return;
-  released_ = true;
-  if (link_.release(settings_.neutral, settings_.disarm)) held_.value = settings_.neutral;
+  const Link::Released done = link_.release(settings_.neutral, settings_.disarm);
+  if (done.neutral) held_.value = settings_.neutral;
+  released_ = done.neutral && done.disarmed;
 }
 
 std::string ModbusActuator::reason() const {

@@ -56,12 +56,16 @@ class ModbusActuator final : public Actuator {
   // refused, or no connection. Fault::device: its health is not what it must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
+  // What the device does not take is tried again by the next release(), by start() and by the
+  // destructor.
   void release() noexcept override;
+  bool released() const noexcept { return released_; }
 
   // Why the last command had a fault; empty when it had none. Not for the loop.
   std::string reason() const;
 
  private:
+  void begin_ages() noexcept SINERIG_NONBLOCKING;
   Fault judge() noexcept SINERIG_NONBLOCKING;
   Fault unknown_for_long() const noexcept SINERIG_NONBLOCKING;
   void look_after_health() noexcept SINERIG_NONBLOCKING;
@@ -75,6 +79,7 @@ class ModbusActuator final : public Actuator {
   Sample held_;
   Fault last_fault_ = Fault::none;
   std::int64_t confirmed_ns_ = 0;
+  bool ages_begin_ = false;  // with the next write()
   bool started_ = false;
   bool released_ = true;
 };

@@ -84,7 +84,16 @@ void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& excha
   bool lost = false;
   exchange.withheld = false;
   ++asked_;
+  transport_.set_usual_patience(patience_ns);
   for (std::size_t n = 0; n < plan.questions.size() && !(too_old && order.commands); ++n) {
+    // An answer that nobody waits for is a late one from the start.
+    if (n > 0 && monotonic_now_ns() >= deadline_ns) {
+      for (std::size_t i = 0; i < plan.fields.size(); ++i)
+        if (plan.fields[i].question >= n) exchange.fields[i].fault = Fault::timeout;
+      if (!failed) failure_ = Answer{.outcome = Outcome::timeout};
+      failed = lost = has_failed_ = true;
+      break;
+    }
     Request question = plan.questions[n];
     if (question.spare > 0)
       question.read_count =

@@ -80,8 +80,16 @@ class Link {
   std::int64_t tick_ns() const noexcept { return tick_ns_; }
   const Exchange& newest() const noexcept { return newest_; }
 
+  struct Released {
+    bool neutral = false;   // taken by the device
+    bool disarmed = false;  // every step was
+  };
+
   // Neutral at once, whatever the loop has handed over, then `disarm`. Bounded in time.
-  bool release(double neutral, const Sequence& disarm) noexcept;
+  Released release(double neutral, const Sequence& disarm) noexcept;
+
+  // Between two runs of the loop: an exchange that ended before is none of the next one's.
+  void forget() noexcept;
 
   const LinkSettings& settings() const noexcept { return settings_; }
 
@@ -96,6 +104,7 @@ class Link {
   void serve() noexcept;
   void serve_one() noexcept;
   void perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept;
+  void drop_exchanges() noexcept;  // with the mutex held
   void make_plans();
   void find_spare_registers();
   void reconnect_now_and_then() noexcept;

@@ -165,21 +165,33 @@ Pace Link::try_out(std::optional<double> command, std::size_t exchanges) {
   return pace;
 }
 
-bool Link::release(double neutral, const Sequence& disarm) noexcept {
+void Link::forget() noexcept {
   const std::scoped_lock lock{mutex_};
-  Order ignored;
-  orders_.take(ignored);
+  drop_exchanges();
+}
+
+void Link::drop_exchanges() noexcept {
+  Order order;
+  orders_.take(order);
+  Exchange exchange;
+  results_.take(exchange);
+  fresh_ = false;
+}
+
+Link::Released Link::release(double neutral, const Sequence& disarm) noexcept {
+  const std::scoped_lock lock{mutex_};
+  drop_exchanges();
   commanded_ = false;
-  if (!command_) return true;
-  bool neutral_is_out = false;
-  for (int n = 0; n < release_tries && !neutral_is_out; ++n) {
+  if (!command_) return {.neutral = true, .disarmed = true};
+  Released released;
+  for (int n = 0; n < release_tries && !released.neutral; ++n) {
     if (!transport_.connected() && !transport_.try_connect()) continue;
     const Answer answer = write_number(transport_, *command_, neutral, settings_.writing,
                                        monotonic_now_ns() + release_answer_ns);
-    neutral_is_out = answer.outcome == Outcome::ok;
+    released.neutral = answer.outcome == Outcome::ok;
   }
-  if (transport_.connected()) run_all(transport_, disarm);
-  return neutral_is_out;
+  released.disarmed = transport_.connected() && run_all(transport_, disarm);
+  return released;
 }
 
 }  // namespace sinerig::modbus

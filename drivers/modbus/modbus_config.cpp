@@ -15,6 +15,8 @@ using config::zero_or_more;
 
 constexpr Range a_register{.min = 0.0, .max = 65535.0};
 constexpr Range a_unit{.min = 0.0, .max = 255.0};
+// On a serial line 0 is for everybody, and nobody answers; 248 to 255 are reserved.
+constexpr Range a_serial_unit{.min = 1.0, .max = 247.0};
 
 // The rates that libmodbus sets; it takes any other for 9600 without a word.
 constexpr std::array bauds = {1200,   2400,    4800,    9600,    19200,   38400,
@@ -44,9 +46,14 @@ Order order(const Section& section, std::string_view key) {
                                                                           : Order::low_first;
 }
 
+Range unit_on(const ConnectionSettings& connection) {
+  return connection.serial ? a_serial_unit : a_unit;
+}
+
 Place read_place(const Section& section, const Connection& connection) {
   Place place;
-  place.unit = static_cast<std::uint8_t>(section.integer("unit_id", a_unit, connection.unit));
+  place.unit = static_cast<std::uint8_t>(
+      section.integer("unit_id", unit_on(connection.link.connection), connection.unit));
   place.address = static_cast<std::uint16_t>(section.integer("register", a_register));
   place.format.type = register_type(section);
   place.format.words = order(section, "word_order");
@@ -136,7 +143,8 @@ Connection read_connection(const Section& section, double rate_hz) {
   LinkSettings& link = connection.link;
   link.connection.name = section.name().substr(sizeof "modbus");
   read_address(section, link.connection);
-  connection.unit = static_cast<std::uint8_t>(section.integer("unit_id", a_unit, 1));
+  connection.unit =
+      static_cast<std::uint8_t>(section.integer("unit_id", unit_on(link.connection), 1));
   const std::string exchange = section.choice("exchange", {"auto", "fc23", "fc16", "fc6"});
   link.writing = exchange == "fc23"   ? Writing::write_and_read
                  : exchange == "fc16" ? Writing::multiple

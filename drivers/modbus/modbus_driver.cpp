@@ -73,6 +73,14 @@ class ModbusDevice final : public Device {
     actuator_->arm();
   }
 
+  void keep_released() noexcept override {
+    if (actuator_) actuator_->release();
+  }
+
+  void catch_up() override {
+    for (const auto& link : links_) link->forget();
+  }
+
   Actuator* actuator() noexcept override { return actuator_ ? &*actuator_ : nullptr; }
   Sensor& sensor(std::size_t index) noexcept override { return *sensors_[index]; }
 

@@ -127,7 +127,7 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
   const bool answered = answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
   if (settings_.serial && !answered)
     late_.expect(request,
-                 answer.received_ns + latest_answer * std::max<std::int64_t>(0, patience_ns));
+                 answer.received_ns + latest_answer * std::max(usual_patience_ns_, patience_ns));
   if (answer.outcome == Outcome::timeout) ++counters_.timeouts;
   if (answer.outcome == Outcome::exception) ++counters_.exceptions;
   if (answer.outcome == Outcome::spoiled) {

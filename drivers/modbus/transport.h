@@ -85,6 +85,9 @@ class Transport {
   Answer ask(const Request& request, std::int64_t deadline_ns,
              std::span<std::uint16_t> registers) noexcept;
 
+  // How long an answer may take as a rule: one to a question with less time left is late no sooner.
+  void set_usual_patience(std::int64_t patience_ns) noexcept { usual_patience_ns_ = patience_ns; }
+
   // Serial lines: finds out whether the adapter returns what is sent. `request` must only read.
   void look_for_echo(const Request& request) noexcept;
   bool echoes() const noexcept { return echoes_; }
@@ -115,6 +118,7 @@ class Transport {
   std::unique_ptr<_modbus, Close> context_;
   TransportCounters counters_;
   std::uint16_t transaction_ = 0;
+  std::int64_t usual_patience_ns_ = 0;
   bool connected_ = false;
   bool echoes_ = false;
   LateAnswers late_;  // serial lines

@@ -17,7 +17,7 @@ namespace sinerig::cli {
 
 struct ChannelCheck {
   std::uint64_t samples = 0;              // new and good
-  std::array<std::uint64_t, 6> faults{};  // by Fault
+  std::array<std::uint64_t, 7> faults{};  // by Fault
   std::uint64_t lost = 0;  // samples that the usual distance between two says are missing
   double rate_hz = 0.0;
   double age_median_s = 0.0;  // of a sample when the loop sees it, as the next two
@@ -25,7 +25,10 @@ struct ChannelCheck {
   double age_most_s = 0.0;
   double jitter_s = 0.0;  // rms of the distance between two samples about its median, losses aside
   double last_value = 0.0;
-  Trip trip{};  // what would have stopped a sweep
+  Trip trip{};                   // what would have stopped a sweep
+  bool answers_command = false;  // nobody asks while nothing is commanded
+
+  bool silent_as_it_should_be() const { return answers_command && samples == 0; }
 
   std::uint64_t faulty(Fault fault) const { return faults[static_cast<std::size_t>(fault)]; }
 };

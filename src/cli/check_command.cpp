@@ -60,7 +60,7 @@ void print_channels(const RigCheck& check, const config::Rig& rig) {
     if (channel.samples > 0)
       print("%.6g %s\n", channel.last_value, rig.sensors[i].unit.c_str());
     else
-      print("none\n");
+      print("%s\n", channel.answers_command ? "answers set-points only" : "none");
     for (const Fault fault : {Fault::timeout, Fault::bus, Fault::range, Fault::device}) {
       if (channel.faulty(fault) == 0) continue;
       print("%-14s %llu of %llu readings had the fault \"%s\"\n", "",
@@ -85,6 +85,7 @@ std::vector<std::string> obstacles(const RigCheck& check, const config::Rig& rig
   if (const std::string refusal = refusal_of_plan(rig); !refusal.empty()) found.push_back(refusal);
   for (std::size_t i = 0; i < check.channels.size(); ++i) {
     const ChannelCheck& channel = check.channels[i];
+    if (channel.silent_as_it_should_be()) continue;
     if (channel.trip.tripped())
       found.push_back(describe_cause(channel.trip, {rig.sensors[i].name}));
     else if (channel.samples == 0)
@@ -121,7 +122,9 @@ int check_command(const CheckOptions& options, const std::vector<DriverKit>& dri
   const StopOnInterrupt stop_on_interrupt;
   const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   configured.open();
-  const RigCheck check = check_on(*loop, configured, options.seconds);
+  RigCheck check = check_on(*loop, configured, options.seconds);
+  for (std::size_t i = 0; i < check.channels.size(); ++i)
+    check.channels[i].answers_command = configured.answers_command(i);
   const std::vector<Remark> remarks = configured.remarks();
 
   const bool in_virtual_time = rig.clock == config::ClockKind::virtual_time;

@@ -81,11 +81,17 @@ void ConfiguredRig::open() {
 
 void ConfiguredRig::arm() {
   for (Part& part : parts_) part.device->arm();
+  for (Part& part : parts_) part.device->catch_up();
+}
+
+void ConfiguredRig::keep_released() noexcept {
+  for (Part& part : parts_) part.device->keep_released();
 }
 
 std::string ConfiguredRig::arm_again() {
   try {
     for (Part& part : parts_) part.device->rearm();
+    for (Part& part : parts_) part.device->catch_up();
     return {};
   } catch (const std::exception& refused) {
     actuator_->release();
@@ -99,6 +105,15 @@ std::vector<Remark> ConfiguredRig::remarks() const {
     for (Remark& remark : part.device->remarks()) remarks.push_back(std::move(remark));
   }
   return remarks;
+}
+
+bool ConfiguredRig::answers_command(std::size_t sensor) const {
+  for (const Part& part : parts_) {
+    const auto found = std::find(part.sensors.begin(), part.sensors.end(), sensor);
+    if (found != part.sensors.end())
+      return part.device->answers_command(static_cast<std::size_t>(found - part.sensors.begin()));
+  }
+  return false;
 }
 
 std::string ConfiguredRig::fault_reason() const {

@@ -28,7 +28,9 @@ class ConfiguredRig final : public Rearm {
   void arm();
   std::string fault_reason() const override;
   std::string arm_again() override;
+  void keep_released() noexcept override;
   std::vector<Remark> remarks() const;
+  bool answers_command(std::size_t sensor) const;  // Device::answers_command()
   Actuator& actuator() { return *actuator_; }
   const std::vector<Sensor*>& sensors() const { return sensors_; }
 

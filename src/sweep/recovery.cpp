@@ -3,6 +3,12 @@
 #include <algorithm>
 
 namespace sinerig {
+namespace {
+
+// A try may take 0.3 s and more of the wait.
+constexpr double between_releases_s = 0.5;
+
+}  // namespace
 
 Recovery::Recovery(const RetrySettings& settings, Clock& clock, RecordSink& sink, Rearm* rearm)
     : settings_{settings},
@@ -36,9 +42,14 @@ Recovery::End Recovery::wait(std::uint32_t dwell, RunControl& control) noexcept 
   const double ticks = settings_.wait_s * clock_.grid().rate_hz();
   control.dwell.store(dwell, std::memory_order_relaxed);
   std::uint64_t now = begin;
+  double next_try = 0.0;
   while (static_cast<double>(now - begin) < ticks) {
     if (control.stop_requests.load(std::memory_order_relaxed) > 0) return End::stop_requested;
     if (!sink_.flush()) return End::recorder_stalled;
+    if (static_cast<double>(now - begin) >= next_try) {
+      rearm_->keep_released();
+      next_try += between_releases_s * clock_.grid().rate_hz();
+    }
     now = clock_.wait().index;
     control.tick.store(now, std::memory_order_relaxed);
   }

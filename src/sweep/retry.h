@@ -57,6 +57,9 @@ class Rearm {
   // Why a device had a fault, for people; empty where it has nothing to say.
   virtual std::string fault_reason() const = 0;
 
+  // While it is waited: a release that could not be carried out, on a dead bus, is tried again.
+  virtual void keep_released() noexcept {}
+
   // Empty when all devices are armed; else why not, and nothing is.
   virtual std::string arm_again() = 0;
 };

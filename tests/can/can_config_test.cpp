@@ -122,8 +122,8 @@ TEST(CanProfile, RmdTorqueReplyIsToldApartByItsCommandByte) {
   EXPECT_EQ(set_point(rmd.command("current"), -1.0), (Bytes{0xA1, 0, 0, 0, 0x9C, 0xFF, 0, 0}));
   const FeedbackSettings angle = rmd.feedback("angle");
   EXPECT_EQ(angle.pattern.id, 0x241u);
-  ASSERT_TRUE(angle.poll.has_value());
-  EXPECT_EQ(bytes_of(*angle.poll), (Bytes{0x92, 0, 0, 0, 0, 0, 0, 0}));
+  ASSERT_EQ(angle.polls.size(), 1u);
+  EXPECT_EQ(bytes_of(angle.polls[0]), (Bytes{0x92, 0, 0, 0, 0, 0, 0, 0}));
   EXPECT_NEAR(value_of(angle, {0x92, 0, 0, 0, 0xA0, 0x8C, 0, 0}), 6.283185307179586, 1e-12);
 }
 
@@ -153,6 +153,80 @@ TEST(CanProfile, Cia402StartsByExpeditedSdoAndSyncsEveryTick) {
   EXPECT_EQ(torque.keep_alive[0].period_ns, 0);
 }
 
+// Before a SYNC, and before the NMT start, it would not be taken.
+TEST(CanProfile, Cia402GetsItsNeutralSetPointRightBeforeOperationIsEnabled) {
+  const CommandSettings torque = Profile("cia402.toml", 4).command("torque");
+  std::vector<std::string> names;
+  for (const Step& step : torque.arm)
+    if (step.neutral || step.name.starts_with("NMT") || step.name.ends_with("enable operation"))
+      names.push_back(step.neutral ? "neutral" : step.name);
+  EXPECT_THAT(names,
+              testing::ElementsAre("NMT operational", "neutral", "controlword enable operation"));
+}
+
+// A drive's first answers say that it is stopped: health must not see them.
+TEST(CanProfile, MoteusIsArmedOnceItReportsPositionMode) {
+  for (const std::uint32_t node : {1U, 7U, 8U, 100U}) {
+    const Profile moteus("moteus.toml", node);
+    const CommandSettings torque = moteus.command("torque");
+    const bool extended = node >= 8;
+    ASSERT_EQ(torque.arm.size(), 1u);
+    EXPECT_TRUE(torque.arm[0].neutral);
+    Frame answer;
+    answer.id = node * 0x100;
+    answer.extended = extended;
+    answer.fd = true;
+    answer.length = 20;
+    EXPECT_FALSE(torque.arm[0].expect->pattern.matches(answer));
+    answer.data[16] = 10;
+    EXPECT_TRUE(torque.arm[0].expect->pattern.matches(answer));
+    EXPECT_EQ(torque.health.at(0).pattern.extended, extended);
+    EXPECT_EQ(moteus.feedback("position").pattern.extended, extended);
+    EXPECT_EQ(moteus.feedback("position").pattern.id, node * 0x100);
+    EXPECT_TRUE(torque.frame.extended && torque.startup.at(0).frame->extended);
+  }
+}
+
+TEST(CanProfile, MiniCheetahIsBelievedWithoutAState) {
+  const Profile mini("mit-mini-cheetah.toml", 5);
+  const CommandSettings torque = mini.command("torque");
+  EXPECT_EQ(set_point(torque, 18.0), (Bytes{0x80, 0x00, 0x80, 0x00, 0x00, 0x00, 0x0F, 0xFF}));
+  EXPECT_TRUE(torque.health.empty());
+  Frame reply;
+  reply.length = 6;
+  reply.data = {5, 0xFF, 0xFF};
+  EXPECT_TRUE(torque.arm.at(0).expect->pattern.matches(reply)) << "the id in the first byte";
+  EXPECT_NEAR(value_of(mini.feedback("position"), {5, 0xFF, 0xFF, 0, 0, 0}), 12.5, 1e-12);
+  EXPECT_NEAR(value_of(mini.feedback("torque"), {5, 0, 0, 0, 0x0F, 0xFF}), 18.0, 1e-12);
+}
+
+TEST(CanProfile, TellWhatComesOnlyAsAnAnswer) {
+  EXPECT_TRUE(Profile("moteus.toml", 1).feedback("torque").answers_command);
+  EXPECT_TRUE(Profile("mit-dm4310.toml", 1).feedback("position").answers_command);
+  EXPECT_TRUE(Profile("myactuator-rmd.toml", 1).feedback("velocity").answers_command);
+  EXPECT_FALSE(Profile("myactuator-rmd.toml", 1).feedback("angle").answers_command) << "asked for";
+  EXPECT_FALSE(Profile("odrive.toml", 1).feedback("position").answers_command);
+}
+
+TEST(CanProfile, ListsOfTheRigFollowThoseOfTheProfile) {
+  const Profile odrive("odrive.toml", 3);
+  const auto rig = RigFile::parse(
+      "[actuator]\nstartup = [{ name = \"limits\", id = 0x00F, length = 8 }]\n"
+      "keep_alive = [{ name = \"alive\", id = 0x700, period_s = 0.1 }]\n"
+      "health = [{ name = \"temperature\", id = 0x015, length = 8, start_bit = 0, at_most = 80 "
+      "}]\n",
+      "rig.toml");
+  const Keys profile = odrive.part("command", "torque");
+  const Keys keys{rig->section("actuator"), ".", profile.at("unit"), devices};
+  const CommandSettings torque = odrive.reader().command(keys, 0.0);
+  std::vector<std::string> names;
+  for (const Step& step : torque.startup) names.push_back(step.name);
+  EXPECT_THAT(names,
+              testing::ElementsAre("clear errors", "torque control, direct input", "limits"));
+  EXPECT_EQ(torque.keep_alive.size(), 1u);
+  EXPECT_EQ(torque.health.size(), 3u);
+}
+
 TEST(CanProfile, EveryShippedProfileIsReadWholeByTheDriver) {
   int profiles = 0;
   for (const auto& entry : std::filesystem::directory_iterator(devices)) {
@@ -173,7 +247,7 @@ TEST(CanProfile, EveryShippedProfileIsReadWholeByTheDriver) {
     EXPECT_NO_THROW(rig.file->refuse_unread()) << entry.path();
     ++profiles;
   }
-  EXPECT_EQ(profiles, 7);
+  EXPECT_EQ(profiles, 8);
 }
 
 // What is said about an actuator section with these keys.
@@ -193,6 +267,43 @@ TEST(CanConfig, DescribesASignalInPlace) {
   EXPECT_EQ(refusal("id = 0x10\nbytes = [1, 2, 0, 0]\nstart_bit = 16\nbits = 16\n"
                     "type = \"int\"\nscale = 0.5\nclamp_max = 5\nchecksum = \"none\"\n"),
             "");
+}
+
+TEST(CanConfig, RefusesConstantsThatTheirBitsCannotHold) {
+  const std::string frame = "id = 0x10\nlength = 8\nstart_bit = 0\n";
+  const auto set = [&](const std::string& rest) {
+    return refusal(frame + "set = [{ start_bit = 16, bits = 8, " + rest + " }]\n");
+  };
+  EXPECT_EQ(set("value = 255"), "");
+  EXPECT_EQ(set("scale = 0.1, value = 0.26"), "") << "rounded to the nearest code";
+  EXPECT_THAT(set("value = 256"),
+              HasSubstr("value = 256: is outside what the signal can hold: 255 is the nearest"));
+  EXPECT_THAT(set("type = \"int\", value = -129"), HasSubstr("-128 is the nearest"));
+  EXPECT_THAT(
+      refusal(
+          frame +
+          "[[actuator.arm]]\nname = \"x\"\n"
+          "id = 1\nexpect = [{ dbc = \"odrive-cansimple.dbc\", signal = \"Heartbeat.Axis_State\", "
+          "value = 300 }]\n"),
+      HasSubstr("is outside what the signal can hold: 255"));
+}
+
+TEST(CanConfig, TakesEveryPollAndOnlyPollsThatAskSomething) {
+  const auto polls = [](const std::string& keys) {
+    const auto file =
+        RigFile::parse("[sensor]\nid = 1\nlength = 8\nstart_bit = 0\n" + keys, "rig.toml");
+    ConfigReader reader(std::nullopt, 2);
+    return reader.feedback(Keys{file->section("sensor"), devices}).polls;
+  };
+  EXPECT_EQ(polls("poll = [{ name = \"a\", id = 2 }, { name = \"b\", id = 3 }]\n").size(), 2u);
+  EXPECT_THAT([&] { polls("poll = [{ name = \"a\" }]\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("needs a frame")));
+}
+
+TEST(CanConfig, AStepWithTheNeutralSetPointHasNoOtherFrame) {
+  EXPECT_THAT(refusal("id = 1\nlength = 8\nstart_bit = 0\n[[actuator.arm]]\nname = \"x\"\n"
+                      "neutral = true\nid = 2\n"),
+              HasSubstr("give no frame beside it"));
 }
 
 TEST(CanConfig, RefusalsNameFileLineKeyAndRule) {

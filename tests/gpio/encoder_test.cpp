@@ -104,6 +104,23 @@ TEST(Quadrature, IsNoLongerBelievedAfterTooManyErrors) {
               HasSubstr("3 illegal transitions and 0 lost edges (errors_max = 2)"));
 }
 
+// While a device is armed again nobody reads, and the kernel keeps the newest 1024 edges.
+TEST(Quadrature, IsBelievedAgainAfterCatchingUp) {
+  Bench bench{plain};
+  for (int n = 1; n <= 3000; ++n)
+    bench.lines.edge(static_cast<std::uint8_t>(n % 2), n, n > 3000 - 1024);
+  bench.clock.now_ns = 3001;
+  bench.encoder.catch_up();
+  EXPECT_EQ(bench.encoder.lost(), 3000U - 1024U);
+  EXPECT_EQ(bench.encoder.reason(), "");
+  EXPECT_EQ(bench.read_at(3002).fault, Fault::none);
+  bench.lines.edge(1, 3003);
+  EXPECT_EQ(bench.read_at(3004).fault, Fault::none);
+
+  bench.lines.refuse = true;
+  EXPECT_THROW(bench.encoder.catch_up(), std::runtime_error);
+}
+
 TEST(Quadrature, SortsEdgesThatChangedPlacesInTheKernel) {
   Bench bench{plain};
   bench.lines.show_count(1, 10);

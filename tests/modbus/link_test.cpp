@@ -210,6 +210,155 @@ TEST_P(ModbusLink, ReleaseWritesNeutralAndDisarmsWhateverWasHandedOver) {
   EXPECT_EQ(number(word_at(32)), 0.0);
 }
 
+// Writes or reads one number beside the driver.
+double number_in(const RunningDrive& drive, const Place& place,
+                 std::optional<double> written = {}) {
+  ConnectionSettings connection;
+  connection.host = "127.0.0.1";
+  connection.port = drive.port();
+  Transport transport{connection};
+  transport.connect();
+  const std::int64_t deadline_ns = monotonic_now_ns() + generous_ns;
+  if (written) write_number(transport, place, *written, Writing::multiple, deadline_ns);
+  std::array<std::uint16_t, max_words> registers{};
+  Request question;
+  question.read_address = place.address;
+  question.read_count = static_cast<std::uint16_t>(place.words());
+  EXPECT_EQ(transport.ask(question, deadline_ns, registers).outcome, Outcome::ok);
+  return decode(registers, place.format);
+}
+
+TEST(ModbusRelease, ThatFindsNoConnectionIsTriedAgain) {
+  sim::DriveSettings settings = drive_settings(false);
+  auto drive = std::make_unique<RunningDrive>(settings);
+  settings.port = drive->port();
+  LinkSettings to_drive;
+  to_drive.connection.host = "127.0.0.1";
+  to_drive.connection.port = settings.port;
+  to_drive.period_ns = generous_ns;
+  to_drive.response_timeout_ns = generous_ns / 2;
+  Link link{to_drive};
+  CommandSettings command = Rig::command();
+  ModbusActuator actuator{link, command};
+  link.open();
+  actuator.start();
+  actuator.arm();
+  const auto lose_the_drive_that_is_on = [&] {
+    actuator.write(3.0);
+    drive.reset();
+    actuator.release();
+    EXPECT_FALSE(actuator.released());
+    drive = std::make_unique<RunningDrive>(settings);
+    EXPECT_EQ(number_in(*drive, word_at(0), 1.0), 1.0);
+    EXPECT_EQ(number_in(*drive, number_at(16), 3.0), 3.0);
+  };
+  const auto expect_released = [&] {
+    EXPECT_EQ(number_in(*drive, word_at(32)), 0.0);
+    EXPECT_EQ(number_in(*drive, number_at(16)), 0.0);
+  };
+  lose_the_drive_that_is_on();
+  actuator.release();
+  EXPECT_TRUE(actuator.released());
+  expect_released();
+  lose_the_drive_that_is_on();
+  link.reconnect();
+  actuator.start();
+  expect_released();
+}
+
+TEST(ModbusRelease, IsNotDoneWhileTheDeviceRefusesToBeDisarmed) {
+  Rig rig{drive_settings(false)};
+  CommandSettings command = Rig::command();
+  command.disarm = {Rig::write("no such register", 0.0)};
+  command.disarm.front().place.address = 1000;
+  rig.actuator.emplace(rig.link, command);
+  rig.link.open();
+  rig.actuator->arm();
+  rig.actuator->release();
+  EXPECT_FALSE(rig.actuator->released());
+}
+
+TEST(ModbusDeadline, NothingIsAskedWhenNobodyWaitsForTheAnswer) {
+  sim::DriveSettings settings = drive_settings(false);
+  settings.turn_around_ns = 50'000'000;
+  const RunningDrive drive{settings};
+  LinkSettings apart;
+  apart.connection.host = "127.0.0.1";
+  apart.connection.port = drive.port();
+  apart.period_ns = generous_ns;
+  apart.response_timeout_ns = 1'000'000;
+  Link link{apart};
+  link.watch(number_at(16), "[sensor.torque]");
+  link.watch(number_at(34), "[sensor.position]");
+  link.open();
+  const std::uint64_t asked = link.counters().asked;
+  link.tick(std::nullopt);
+  while (link.pace().exchanges == 0) std::this_thread::yield();
+  EXPECT_EQ(link.counters().asked, asked + 1);
+  while (!link.fresh()) link.tick(std::nullopt);
+  EXPECT_EQ(link.newest().fields[0].fault, Fault::timeout);
+  EXPECT_EQ(link.newest().fields[1].fault, Fault::timeout);
+}
+
+// What was left of an exchange's time says nothing of how late an answer can be.
+TEST(ModbusDeadline, ALateAnswerIsWaitedForByTheTimeOutThatIsConfigured) {
+  sim::DriveSettings settings = drive_settings(true);
+  settings.faults.lost_fraction = 1.0;
+  const RunningDrive drive{settings};
+  ConnectionSettings connection;
+  connection.serial = true;
+  connection.device = line_path();
+  connection.baud = 1'000'000;
+  Transport transport{connection};
+  transport.set_usual_patience(generous_ns);
+  transport.connect();
+  Request question;
+  question.read_address = 16;
+  question.read_count = 4;
+  std::array<std::uint16_t, max_words> registers{};
+  const Answer hurried = transport.ask(question, monotonic_now_ns(), registers);
+  EXPECT_EQ(hurried.outcome, Outcome::timeout);
+  EXPECT_FALSE(hurried.withheld);
+  EXPECT_TRUE(transport.ask(question, monotonic_now_ns() + 1'000'000, registers).withheld);
+}
+
+// What the thread has done by itself since the last tick.
+void let_an_exchange_end(Rig& rig, std::size_t exchanges_before) {
+  while (rig.link.pace().exchanges == exchanges_before) std::this_thread::yield();
+}
+
+TEST(ModbusLinkAgain, NothingOfBeforeAWaitIsFreshAfterIt) {
+  Rig rig{drive_settings(false)};
+  rig.open();
+  rig.actuator->arm();
+  std::size_t before = rig.link.pace().exchanges;
+  rig.actuator->write(1.0);
+  let_an_exchange_end(rig, before);
+  rig.actuator->release();
+  rig.actuator->start();
+  rig.actuator->arm();
+  EXPECT_EQ(rig.actuator->write(0.0).fault, Fault::stale);
+  EXPECT_EQ(rig.position->read().fault, Fault::stale);
+
+  rig.actuator->release();
+  before = rig.link.pace().exchanges;
+  rig.link.tick(std::nullopt);
+  let_an_exchange_end(rig, before);
+  rig.link.forget();
+  rig.link.tick(std::nullopt);
+  EXPECT_FALSE(rig.link.fresh());
+}
+
+TEST(ModbusLinkAgain, AgesBeginWithTheFirstTickNotWithArming) {
+  Rig rig{drive_settings(false)};
+  CommandSettings command = Rig::command();
+  command.max_age_ns = 1;
+  rig.actuator.emplace(rig.link, command);
+  rig.link.open();
+  rig.actuator->arm();
+  EXPECT_EQ(rig.actuator->write(0.0).fault, Fault::stale) << rig.actuator->reason();
+}
+
 TEST_P(ModbusLink, ACommandThatIsNoNumberWritesNeutral) {
   Rig rig{drive_settings(GetParam())};
   rig.open();
@@ -289,7 +438,8 @@ TEST_P(ModbusLink, AnExchangeThatLosesOneAnswerAndHoldsBackAnotherHasFailed) {
   link.open();
   const Pace pace = link.try_out(std::nullopt, 8);
   EXPECT_EQ(pace.exchanges, 8U);
-  EXPECT_EQ(pace.failed, 6U);  // 5 where what is held back hides what is lost
+  // A question that is not asked after a lost answer draws no lot: on TCP another sequence of them.
+  EXPECT_EQ(pace.failed, GetParam() ? 6U : 7U);
   EXPECT_THAT(obstacle(link, pace), HasSubstr("exchanges failed: "));
 }
 

@@ -56,6 +56,13 @@ TEST(ModbusConfig, RefusalsNameFileLineKeyAndRule) {
   EXPECT_THAT(refusal(with("[modbus.drive]\ntransport = \"rtu\"\ndevice = \"/dev/x\"\n"
                            "baud = 12345\n")),
               HasSubstr("[modbus.drive] baud = 12345: must be one of 1200 2400"));
+  const std::string line = "[modbus.drive]\ntransport = \"rtu\"\ndevice = \"/dev/x\"\n";
+  EXPECT_EQ(refusal(with(line + "unit_id = 247\n")), "");
+  EXPECT_THAT(refusal(with(line + "unit_id = 248\n")),
+              HasSubstr("unit_id = 248: must be at least 1 and at most 247"));
+  EXPECT_THAT(refusal(with(line, "unit_id = 255\n")),
+              HasSubstr("[actuator] unit_id = 255: must be at least 1 and at most 247"));
+  EXPECT_EQ(refusal(with(std::string{tcp} + "unit_id = 255\n")), "") << "usual over TCP";
   EXPECT_THAT(refusal(with(std::string{tcp} + "device = \"/dev/x\"\n")),
               HasSubstr("[modbus.drive] device: unknown key"));
   EXPECT_THAT(refusal(with(std::string{tcp} + "response_timeout_s = 0.01\n")),

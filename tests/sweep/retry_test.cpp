@@ -49,7 +49,10 @@ class TrippingDrive final : public Rearm {
     return "";
   }
 
+  void keep_released() noexcept override { released_at.push_back(bench_.clock.tick()); }
+
   bool tripped = false;
+  std::vector<std::uint64_t> released_at;
   int refusals = 0;
   std::vector<std::uint64_t> armed_at;
 
@@ -82,6 +85,15 @@ TEST(AFault, IsAnsweredByDisarmingWaitingArmingAndRepeatingThePoint) {
   ASSERT_NE(after, writes.end());
   EXPECT_EQ(after->tick, 582U);
   EXPECT_NEAR(after->command, GuardedBench::neutral, 1e-12);
+}
+
+// A drive that could not be reached when it was to be released still follows its last set-point.
+TEST(AFault, IsFollowedByTriesToReleaseForAsLongAsItIsWaited) {
+  GuardedBench bench;
+  TrippingDrive drive{bench, {80}};
+  bench.runner_settings.retry = {.faults = 2, .wait_s = 2.0};
+  bench.run(&drive);
+  EXPECT_EQ(drive.released_at, (std::vector<std::uint64_t>{81, 581, 1081, 1581}));
 }
 
 TEST(AFault, StopsTheSweepWhereItIsNotToBeRetried) {
