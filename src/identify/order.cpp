@@ -33,6 +33,7 @@ constexpr int subsets_per_order = 4;
 constexpr int image_passes = 2;
 // Images that change the response by less than this part of its scatter have settled.
 constexpr double settled_images = 0.03;
+constexpr std::size_t most_constrained_fits = 8;
 
 class Selector {
  public:
@@ -53,7 +54,7 @@ class Selector {
       if (!possible({zeros, poles, origin})) continue;
       const Trial trial = attempt({zeros, poles, origin}, {});
       const double criterion = unknown_noise_criterion(trial.candidate);
-      if (criterion < best) {
+      if (!trial.candidate.at_limit && criterion < best) {
         best = criterion;
         images_ = trial.images;
         lowest_ = poles;
@@ -114,16 +115,23 @@ class Selector {
 
   std::vector<OrderCandidate> ranked() const {
     std::vector<OrderCandidate> table;
-    const bool noise_known = response_has_scatter() && any_explained();
     for (OrderCandidate candidate : trials_) {
-      candidate.criterion = noise_known ? candidate.chi2 + candidate.parameters * penalty()
-                                        : unknown_noise_criterion(candidate);
+      candidate.criterion = criterion(candidate, 0);
       table.push_back(candidate);
     }
     std::sort(table.begin(), table.end(), [](const OrderCandidate& a, const OrderCandidate& b) {
-      return a.criterion < b.criterion;
+      return a.at_limit != b.at_limit ? b.at_limit : a.criterion < b.criterion;
     });
     return table;
+  }
+
+  // A point left out counts as much χ² as it takes to be one.
+  double criterion(OrderCandidate candidate, std::size_t outliers) const {
+    candidate.chi2 +=
+        static_cast<double>(outliers) * cost_of_outlier(make_fit_data(response_, 0.0));
+    return response_has_scatter() && any_explained()
+               ? candidate.chi2 + candidate.parameters * penalty()
+               : unknown_noise_criterion(candidate);
   }
 
   FitOptions options(const Structure& structure) const {
@@ -169,7 +177,7 @@ class Selector {
 
   bool any_explained() const {
     return std::any_of(trials_.begin(), trials_.end(),
-                       [](const OrderCandidate& c) { return c.explained; });
+                       [](const OrderCandidate& c) { return c.explained && !c.at_limit; });
   }
 
   double unknown_noise_criterion(const OrderCandidate& c) const {
@@ -217,14 +225,17 @@ class Selector {
     trial.delay_s = refined.rational.delay_s;
     if (held) trial.images = data.known / setup.data.known;
     const double cost = refined.rational.cost;
-    trial.settled = explained_by_noise(setup.data, setup.freedom, cost, 2.0);
+    const bool at_limit =
+        std::isfinite(cost) && held_by_constraints(data, setup.freedom, refined, structure.origin);
+    trial.settled = !at_limit && explained_by_noise(setup.data, setup.freedom, cost, 2.0);
     trial.candidate = {structure.zeros,
                        structure.poles,
                        structure.origin,
                        setup.freedom.parameters(),
                        cost,
                        0.0,
-                       explained_by_noise(setup.data, setup.freedom, cost, 3.0)};
+                       explained_by_noise(setup.data, setup.freedom, cost, 3.0),
+                       at_limit};
     if (std::isfinite(cost)) trials_.push_back(trial.candidate);
     return trial;
   }
@@ -239,6 +250,47 @@ class Selector {
   std::vector<OrderCandidate> trials_;
 };
 
+bool leans_on_constraints(const Response& response, const OrderSelection& selection) {
+  const double first = response.front().omega_rad_s;
+  const auto lean = [first](const std::vector<std::complex<double>>& roots) {
+    return std::any_of(roots.begin(), roots.end(), [first](std::complex<double> root) {
+      return root != 0.0 && near_axis(root, first);
+    });
+  };
+  if (selection.chosen.stable && selection.chosen.origin > 0 &&
+      hides_origin(selection.fit.zpk.zeros, first))
+    return true;
+  return (selection.chosen.stable && lean(selection.fit.zpk.poles)) ||
+         (selection.chosen.minimum_phase && lean(selection.fit.zpk.zeros));
+}
+
+// Where a constrained search ends depends on its start more than a free one does, and a trial is
+// quick: the best of them are fitted in full and compared by that.
+void choose_constrained(const Response& response, const Selector& selector,
+                        OrderSelection& selection) {
+  auto& table = selection.table;
+  std::vector<std::pair<OrderCandidate, OrderSelection>> fits;
+  const std::size_t tried = std::min(table.size(), most_constrained_fits);
+  for (std::size_t i = 0; i < tried; ++i) {
+    OrderSelection full;
+    full.chosen = selector.options({table[i].zeros, table[i].poles, table[i].origin});
+    full.fit = fit_maximum_likelihood(response, full.chosen);
+    table[i].chi2 = full.fit.chi2;
+    table[i].at_limit = !full.fit.converged || leans_on_constraints(response, full);
+    table[i].criterion = selector.criterion(table[i], full.fit.outliers.size());
+    fits.emplace_back(table[i], full);
+  }
+  const auto before = [](const OrderCandidate& a, const OrderCandidate& b) {
+    return a.at_limit != b.at_limit ? b.at_limit : a.criterion < b.criterion;
+  };
+  std::sort(table.begin(), table.begin() + static_cast<std::ptrdiff_t>(tried), before);
+  const auto best = std::min_element(
+      fits.begin(), fits.end(),
+      [&before](const auto& a, const auto& b) { return before(a.first, b.first); });
+  selection.chosen = best->second.chosen;
+  selection.fit = best->second.fit;
+}
+
 }  // namespace
 
 OrderSelection select_order(const Response& response, const OrderSettings& settings) {
@@ -252,9 +304,13 @@ OrderSelection select_order(const Response& response, const OrderSettings& setti
   if (selection.table.empty())
     throw std::invalid_argument(
         "order: no structure is possible with the parts that are given; release one of them");
-  const OrderCandidate& best = selection.table.front();
-  selection.chosen = selector.options({best.zeros, best.poles, best.origin});
-  selection.fit = fit_maximum_likelihood(response, selection.chosen);
+  if (settings.fit.stable || settings.fit.minimum_phase) {
+    choose_constrained(response, selector, selection);
+  } else {
+    const OrderCandidate& best = selection.table.front();
+    selection.chosen = selector.options({best.zeros, best.poles, best.origin});
+    selection.fit = fit_maximum_likelihood(response, selection.chosen);
+  }
   return selection;
 }
 
