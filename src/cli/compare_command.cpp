@@ -8,10 +8,10 @@
 
 #include "cli/commands.h"
 #include "cli/drift_figures.h"
+#include "cli/measured_run.h"
 #include "cli/output_file.h"
 #include "cli/report_file.h"
 #include "cli/run_differences.h"
-#include "record/measured.h"
 #include "report/comparison.h"
 #include "report/html.h"
 
@@ -35,7 +35,7 @@ std::string label_of(const std::string& file, const std::vector<std::string>& fi
 int compare_command(const CompareOptions& options) {
   std::vector<report::LabelledRun> runs;
   for (const std::string& file : options.files)
-    runs.push_back({.label = label_of(file, options.files), .run = record::read_measured(file)});
+    runs.push_back({.label = label_of(file, options.files), .run = read_run(file)});
   const std::vector<Difference> differences = differences_of(runs, options.settings);
 
   std::size_t compared = 0;
