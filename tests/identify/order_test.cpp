@@ -98,6 +98,29 @@ TEST(Order, IsFoundBehindAHoldWhoseImagesAreLarge) {
   }
 }
 
+// A dead time that is said to be none pulls poles to the right; asked for stable ones, the
+// structure is chosen among those that are stable without being held so.
+TEST(Order, IsChosenAmongStableModelsWhenThatIsAsked) {
+  ZerosPolesGain plant{{}, {}, 1.0, 0.02};
+  add_pair(plant.poles, 10.0, 0.6);
+  set_static_gain(plant, 1.0);
+  Random random(6);
+  const std::vector<double> grid =
+      log_grid(2.0 * std::numbers::pi * 0.5, 2.0 * std::numbers::pi * 50.0, 40);
+  Response response = noisy_response(plant, grid, 0.003, random);
+  for (ResponsePoint& point : response)
+    point.response *= 1.0 - 0.01 * std::complex<double>{0.0, 1.0} / (0.1 * point.omega_rad_s + 0.3);
+  OrderSettings settings;
+  settings.fit.delay = Delay::none;
+  settings.fit.stable = true;
+  const OrderSelection selection = select_order(response, settings);
+  EXPECT_FALSE(selection.table.front().at_limit);
+  EXPECT_TRUE(selection.fit.converged);
+  EXPECT_EQ(selection.table.front().poles, selection.chosen.poles);
+  EXPECT_DOUBLE_EQ(selection.table.front().chi2, selection.fit.chi2);
+  for (const std::complex<double> pole : selection.fit.zpk.poles) EXPECT_LE(pole.real(), 0.0);
+}
+
 TEST(Order, KeepsThePartsThatAreGiven) {
   Random random(5);
   const Response response = noisy_response(choe_example_3(), choe_grid(), 0.01, random);
