@@ -60,6 +60,8 @@ CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
       ->check(CLI::IsMember({"plant", "loop", "sensitivity", "complementary"}))
       ->capture_default_str();
   add_loop_options(*margins, options.loop);
+  margins->add_flag("--negate", options.negate,
+                    "take minus what was measured: a loop measured as control over torque is -L");
   margins->add_option("--controller-file", options.loop.controller_file,
                       "measured response of the controller, sweep file or CSV");
   margins->add_option("--channel", options.channel, "sensor of a sweep file (default: the first)");

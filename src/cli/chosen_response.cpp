@@ -4,6 +4,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "cli/measured_run.h"
+
 namespace sinerig::cli {
 
 const record::StoredResponse& chosen_response(const record::StoredRun& run, const std::string& file,
@@ -18,13 +20,11 @@ const record::StoredResponse& chosen_response(const record::StoredRun& run, cons
     }
     return run.responses.front();
   }
-  const auto found =
-      std::find_if(run.responses.begin(), run.responses.end(),
-                   [&](const auto& each) { return run.channels.at(each.output).name == channel; });
+  const auto found = std::find_if(run.responses.begin(), run.responses.end(),
+                                  [&](const auto& each) { return is_named(run, each, channel); });
   if (found != run.responses.end()) return *found;
-  std::string names;
-  for (const auto& each : run.responses) names += " " + run.channels.at(each.output).name;
-  throw record::SweepFileError(file + ": has no response of \"" + channel + "\"; it has" + names);
+  throw record::SweepFileError(file + ": has no response of \"" + channel + "\"; it has" +
+                               names_of_responses(run));
 }
 
 }  // namespace sinerig::cli

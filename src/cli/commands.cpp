@@ -5,8 +5,8 @@
 #include <nlohmann/json.hpp>
 
 #include "cli/configured_rig.h"
+#include "cli/measured_run.h"
 #include "record/exporters.h"
-#include "record/measured.h"
 #include "report/terminal.h"
 
 namespace sinerig::cli {
@@ -51,7 +51,7 @@ int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drive
 }
 
 int show_command(const ShowOptions& options) {
-  const record::StoredRun run = record::read_measured(options.file);
+  const record::StoredRun run = read_run(options.file);
   if (options.json) {
     record::write_json(std::cout, run);
   } else {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -8,10 +9,10 @@
 
 #include "cli/commands.h"
 #include "cli/drift_figures.h"
+#include "cli/measured_run.h"
 #include "cli/output_file.h"
 #include "cli/report_file.h"
 #include "cli/run_differences.h"
-#include "record/measured.h"
 #include "report/comparison.h"
 #include "report/html.h"
 
@@ -30,24 +31,36 @@ std::string label_of(const std::string& file, const std::vector<std::string>& fi
   return label;
 }
 
+// The files beside the first of which no point could be compared.
+std::vector<std::string> files_without_points(const std::vector<report::LabelledRun>& runs,
+                                              const std::vector<Difference>& differences) {
+  std::vector<std::string> labels;
+  for (std::size_t i = 1; i < runs.size(); ++i) {
+    const bool compared = std::any_of(
+        differences.begin(), differences.end(),
+        [&](const Difference& each) { return each.file == runs[i].label && each.compared(); });
+    if (!compared) labels.push_back(runs[i].label);
+  }
+  return labels;
+}
+
 }  // namespace
 
 int compare_command(const CompareOptions& options) {
   std::vector<report::LabelledRun> runs;
   for (const std::string& file : options.files)
-    runs.push_back({.label = label_of(file, options.files), .run = record::read_measured(file)});
+    runs.push_back({.label = label_of(file, options.files), .run = read_run(file)});
   const std::vector<Difference> differences = differences_of(runs, options.settings);
 
-  std::size_t compared = 0;
   bool changed = false;
-  for (const Difference& difference : differences) {
-    compared += difference.points.size();
-    changed = changed || difference.changed();
-  }
-  if (compared == 0) {
+  for (const Difference& difference : differences) changed = changed || difference.changed();
+  const std::vector<std::string> incomparable = files_without_points(runs, differences);
+  if (incomparable.size() + 1 == runs.size() && !changed) {
     throw record::SweepFileError(
         "nothing to compare: the files have no frequency in common at which both points are good");
   }
+  for (const std::string& label : incomparable)
+    spdlog::warn("{}: nothing to compare, no frequency at which both points are good", label);
   std::vector<report::Drift> drifts;
   if (options.drift || has_controller(options.loop)) {
     std::vector<std::string> labels;
@@ -73,7 +86,8 @@ int compare_command(const CompareOptions& options) {
         [&](std::ostream& stream) { report::write_html(stream, runs, differences, drifts); });
     spdlog::info("wrote {}", options.output);
   }
-  return changed ? exit_changed : exit_done;
+  if (changed) return exit_changed;
+  return incomparable.empty() ? exit_done : exit_failed;
 }
 
 }  // namespace sinerig::cli

@@ -8,38 +8,16 @@
 #include <map>
 #include <numbers>
 
+#include "record/csv_text.h"
+
 namespace sinerig::cli {
 
 namespace {
 
+using record::fields_of;
+using record::is_number;
+
 constexpr double turn = 2.0 * std::numbers::pi;
-constexpr const char* blanks = " \t\r\"\f\v";
-
-std::string trimmed(const std::string& text) {
-  const auto first = text.find_first_not_of(blanks);
-  if (first == std::string::npos) return {};
-  return text.substr(first, text.find_last_not_of(blanks) - first + 1);
-}
-
-std::vector<std::string> fields_of(const std::string& line) {
-  const char separator = line.find(',') != std::string::npos   ? ','
-                         : line.find(';') != std::string::npos ? ';'
-                                                               : '\t';
-  std::vector<std::string> fields;
-  for (std::size_t begin = 0;;) {
-    const std::size_t end = line.find(separator, begin);
-    fields.push_back(trimmed(line.substr(begin, end - begin)));
-    if (end == std::string::npos) return fields;
-    begin = end + 1;
-  }
-}
-
-bool is_number(const std::string& field) {
-  char* end = nullptr;
-  std::strtod(field.c_str(), &end);
-  return !field.empty() && *end == '\0';
-}
-
 std::string text_of(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.10g", value);
@@ -55,9 +33,9 @@ class Lines {
 
   bool next(std::string& line) {
     while (std::getline(file_, line)) {
-      if (++number_ == 1 && line.rfind("\xEF\xBB\xBF", 0) == 0) line.erase(0, 3);
+      if (++number_ == 1) record::drop_byte_order_mark(line);
       if (line.find('\0') != std::string::npos) refuse("holds binary data; wanted text");
-      const std::string content = trimmed(line);
+      const std::string content = record::trimmed_field(line);
       if (!content.empty() && content.front() != '#') return true;
     }
     return false;
@@ -160,6 +138,8 @@ class Reader {
     point.omega_rad_s = has("freq_hz") ? turn * number("freq_hz") : number("omega_rad_s");
     check_order(point.omega_rad_s);
     point.response = measured();
+    if (has("hold_rate_hz") && csv_.response.empty())
+      csv_.hold_rate_hz = std::max(number_or_zero("hold_rate_hz"), 0.0);
     if (has("std")) {
       const double deviation = number_or_zero("std");
       if (deviation < 0.0) lines_.refuse("std is below zero");

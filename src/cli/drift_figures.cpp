@@ -98,12 +98,15 @@ std::vector<report::Drift> drift_of(const std::vector<std::string>& files,
                                     const std::vector<std::string>& labels,
                                     const DriftSettings& settings) {
   const bool closed = has_controller(settings.loop);
-  const PlantModel first = read_plant_model(files.front(), settings.channel, false);
+  const PlantModel first =
+      read_plant_model(files.front(), settings.channel, false, settings.loop.hold_hz);
+  warn_of_unknown_hold(settings.loop, first.measured);
   const std::optional<LoopFigures> first_loop =
       closed ? std::optional{loop_figures(settings.loop, first)} : std::nullopt;
   std::vector<report::Drift> drifts;
   for (std::size_t i = 1; i < files.size(); ++i) {
-    const PlantModel other = read_plant_model(files[i], settings.channel, false);
+    const PlantModel other =
+        read_plant_model(files[i], settings.channel, false, settings.loop.hold_hz);
     report::Drift drift{.name = labels[i], .figures = {}};
     for (const Mode& mode : first.modes)
       if (is_resonance(mode)) add_mode(drift, &mode, nearest(other.modes, mode.frequency_hz.value));

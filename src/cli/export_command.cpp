@@ -7,10 +7,10 @@
 
 #include "cli/chosen_response.h"
 #include "cli/commands.h"
+#include "cli/measured_run.h"
 #include "cli/output_file.h"
 #include "record/exporters.h"
 #include "record/mat_file.h"
-#include "record/measured.h"
 #include "record/snippet.h"
 #include "record/uff58.h"
 
@@ -80,7 +80,7 @@ void export_mat(const StoredRun& run, const ExportOptions& options) {
 }  // namespace
 
 int export_command(const ExportOptions& options) {
-  const StoredRun run = record::read_measured(options.file);
+  const StoredRun run = read_run(options.file);
   if (options.format == "mat") {
     export_mat(run, options);
   } else if (options.output.empty()) {

@@ -1,7 +1,9 @@
 #include "cli/fit_command.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdio>
 #include <iostream>
 #include <numbers>
 #include <stdexcept>
@@ -60,9 +62,12 @@ Measured measure(const FitCommandOptions& options) {
   }
   measured.response = responses.size() == 1 ? responses.front() : identify::merged(responses);
   if (options.hold == "auto") {
-    const double rate_hz = measured.inputs.front().rate_hz;
+    const double rate_hz = measured.inputs.front().hold_hz;
+    if (rate_hz == 0.0 && measured.inputs.front().rate_hz > 0.0)
+      spdlog::info("{}: both signals are on the loop's side of its hold, so none is modelled",
+                   measured.inputs.front().label);
     for (const FitInput& input : measured.inputs)
-      if (input.rate_hz != rate_hz)
+      if (input.hold_hz != rate_hz)
         throw std::invalid_argument(
             "fit: the files come from loops of different rates, so no one hold fits them all; fit "
             "them one by one, or give --hold none");
@@ -135,6 +140,41 @@ void fit_by_likelihood(const FitCommandOptions& options, const Measured& measure
     fit = selection.chosen;
   }
   report.fit = fitted(measured, fit);
+}
+
+// The poles of a fit that grow, as text in Hz; empty where none does.
+std::string growing_poles(const identify::Fit& fit) {
+  std::string text;
+  for (const std::complex<double> pole : fit.zpk.poles) {
+    if (pole.real() <= 0.0 || pole.imag() < 0.0) continue;
+    char number[48];
+    std::snprintf(number, sizeof number, "%.3g Hz", std::abs(pole) / (2.0 * std::numbers::pi));
+    text += (text.empty() ? "" : ", ") + std::string{number};
+  }
+  return text;
+}
+
+// A rig that was swept in open loop and stood it is stable, whatever a fit makes of its friction,
+// its noise or an order too high.
+void look_at_stability(const FitCommandOptions& options, const Measured& measured,
+                       report::FitReport& report) {
+  const bool open_loop = std::all_of(measured.inputs.begin(), measured.inputs.end(),
+                                     [](const FitInput& input) { return input.driven_by_command; });
+  const std::string growing = growing_poles(report.fit);
+  if (growing.empty() || !open_loop) return;
+  if (!options.stable_in_open_loop || options.method != "ml") {
+    spdlog::warn(
+        "the model is unstable (poles in the right half plane at {}), but what was swept in open "
+        "loop without running away is not: margins of this model mislead; fit with --stable, or "
+        "with lower orders",
+        growing);
+    return;
+  }
+  spdlog::info("the free fit has poles in the right half plane at {}; fitting with --stable",
+               growing);
+  FitCommandOptions stable = options;
+  stable.stable = true;
+  fit_by_likelihood(stable, measured, report);
 }
 
 // The paper's methods know neither delay nor hold: both are divided out of the data first.
@@ -250,6 +290,7 @@ report::FitReport fit_files(const FitCommandOptions& options) {
     fit_by_likelihood(options, measured, report);
   else
     fit_by_paper(options, measured, report);
+  look_at_stability(options, measured, report);
 
   add_discrete(options, measured, report);
   store(options, measured, report);

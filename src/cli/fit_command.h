@@ -31,6 +31,9 @@ struct FitCommandOptions {
   double rate_hz = 0.0;      // of the discrete equivalent; 0: that of the loop
   double prewarp_hz = 0.0;   // tustin
   bool stable = false;
+  // Fit again as if stable were set where the rig was driven in open loop and the free fit is
+  // unstable: for fits that nobody looks at before they are used.
+  bool stable_in_open_loop = false;
   bool minimum_phase = false;
   bool keep_outliers = false;
   bool json = false;

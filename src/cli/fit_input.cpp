@@ -1,6 +1,7 @@
 #include "cli/fit_input.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -10,8 +11,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include "cli/measured_run.h"
 #include "identify/scatter.h"
-#include "record/measured.h"
 
 namespace sinerig::cli {
 
@@ -46,17 +47,18 @@ std::vector<double> edges_between_sub_bands(const record::StoredRun& run) {
 FitInput from_run(const record::StoredRun& run, const std::string& path,
                   const std::string& channel) {
   const auto wanted = std::find_if(run.responses.begin(), run.responses.end(), [&](const auto& r) {
-    return channel.empty() || run.channels.at(r.output).name == channel;
+    return channel.empty() || is_named(run, r, channel);
   });
   if (wanted == run.responses.end()) {
-    std::string names;
-    for (const auto& each : run.responses) names += " " + run.channels.at(each.output).name;
-    throw InputError(path + ": has no response of \"" + channel + "\"; it has" + names);
+    throw InputError(path + ": has no response of \"" + channel + "\"; it has" +
+                     names_of_responses(run));
   }
   FitInput input;
   input.rate_hz = run.plan.rate_hz;
+  input.hold_hz = wanted->hold_rate_hz;
   input.input = wanted->input;
   input.output = wanted->output;
+  input.driven_by_command = wanted->input <= 1;
   input.band_edges_rad_s = edges_between_sub_bands(run);
   input.label = run.channels.at(wanted->input).name + " to " + run.channels.at(wanted->output).name;
   std::vector<double> degrees_of_freedom;
@@ -76,7 +78,20 @@ FitInput from_run(const record::StoredRun& run, const std::string& path,
   return input;
 }
 
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char each) { return static_cast<char>(std::tolower(each)); });
+  return text;
+}
+
 }  // namespace
+
+void take_hold(FitInput& input, double hold_hz) {
+  if (!(hold_hz >= 0.0) || !std::isfinite(hold_hz))
+    throw InputError("--hold: wanted the rate of the hold in Hz, or 0 for none");
+  input.hold_hz = hold_hz;
+  if (input.rate_hz == 0.0) input.rate_hz = hold_hz;
+}
 
 std::vector<double> edges_between(std::vector<std::pair<double, double>> bands_hz) {
   std::sort(bands_hz.begin(), bands_hz.end());
@@ -95,12 +110,13 @@ FitInput read_fit_input(const std::string& path, const std::string& channel, boo
     return input;
   }
   for (const char* extension : {".mat", ".uff", ".unv"}) {
-    if (path.ends_with(extension)) return from_run(record::read_measured(path), path, channel);
+    if (lower_case(path).ends_with(extension)) return from_run(read_run(path), path, channel);
   }
   CsvResponse csv = read_csv_response(path, trust_units);
   FitInput input;
   input.response = std::move(csv.response);
   input.weights = std::move(csv.weights);
+  input.rate_hz = input.hold_hz = csv.hold_rate_hz;
   input.label = path;
   return input;
 }

@@ -15,6 +15,10 @@ void add_loop_options(CLI::App& command, LoopOptions& options) {
   command.add_option("--rate", options.rate_hz,
                      "rate in Hz that the controller runs at, by Tustin behind a zero-order hold; "
                      "0: continuous (default: the loop rate of a sweep file)");
+  command.add_option(
+      "--hold", options.hold_hz,
+      "rate in Hz of the zero-order hold that the plant was measured behind, 0: none "
+      "(default: what the file says); the model is made without it");
   command.add_option("--loop-delay", options.delay_s,
                      "more delay in the loop, seconds: calculation, transport");
 }

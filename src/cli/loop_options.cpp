@@ -7,6 +7,8 @@
 #include <numbers>
 #include <stdexcept>
 
+#include <spdlog/spdlog.h>
+
 #include "identify/hold.h"
 #include "identify/polynomial.h"
 
@@ -83,6 +85,14 @@ double loop_rate_hz(const LoopOptions& options, const FitInput& measured) {
   return rate_hz;
 }
 
+void warn_of_unknown_hold(const LoopOptions& options, const FitInput& measured) {
+  if (measured.rate_hz > 0.0 || options.hold_hz || !(loop_rate_hz(options, measured) > 0.0)) return;
+  spdlog::warn(
+      "{} does not say the rate of the loop that it was measured in; if a hold drove the plant it "
+      "is counted twice here: --hold HZ takes it out, --hold 0 says that there was none",
+      measured.label);
+}
+
 identify::LoopModel model_loop(const LoopOptions& options, const PlantModel& plant) {
   identify::ZerosPolesGain delayed = plant.zpk;
   delayed.delay_s += options.delay_s;
@@ -98,7 +108,7 @@ identify::Curve measured_loop(const LoopOptions& options, const FitInput& measur
     if (rate_hz > 0.0 && omega >= std::numbers::pi * rate_hz) continue;
     Complex factor =
         controller_at(controller, rate_hz, omega) * std::polar(1.0, -omega * options.delay_s);
-    if (measured.rate_hz > 0.0) factor /= identify::hold_factor(omega, 1.0 / measured.rate_hz);
+    if (measured.hold_hz > 0.0) factor /= identify::hold_factor(omega, 1.0 / measured.hold_hz);
     if (rate_hz > 0.0) factor *= identify::hold_factor(omega, 1.0 / rate_hz);
     const double c = factor.real();
     const double s = factor.imag();

@@ -16,6 +16,7 @@ struct LoopOptions {
   std::vector<double> pid;        // KP,KI,KD[,FILTER_HZ]
   std::string controller_file;    // a measured controller, sweep file or CSV
   std::optional<double> rate_hz;  // of the controller; 0: continuous; default: that of the sweep
+  std::optional<double> hold_hz;  // the plant was measured behind; 0: none; default: the file's
   double delay_s = 0.0;           // of the loop, beside the plant's
 };
 
@@ -27,6 +28,9 @@ std::string controller_text(const LoopOptions& options);
 
 // The rate that the controller runs at; 0: continuous.
 double loop_rate_hz(const LoopOptions& options, const FitInput& measured);
+
+// Warns where the file does not say what hold it was measured behind and the loop has one.
+void warn_of_unknown_hold(const LoopOptions& options, const FitInput& measured);
 
 // L of the model. Throws std::invalid_argument as LoopModel does.
 identify::LoopModel model_loop(const LoopOptions& options, const PlantModel& plant);

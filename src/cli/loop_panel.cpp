@@ -57,7 +57,7 @@ std::vector<double> grid_of(const PlantModel& plant) {
 }  // namespace
 
 Json loop_panel(const std::string& file, const std::string& channel, const LoopOptions& options) {
-  const PlantModel plant = read_plant_model(file, channel, false);
+  const PlantModel plant = read_plant_model(file, channel, false, options.hold_hz);
   LoopOptions loop = options;
   if (!loop.rate_hz && plant.measured.rate_hz > 0.0) loop.rate_hz = plant.measured.rate_hz;
   const identify::LoopModel model = model_loop(loop, plant);

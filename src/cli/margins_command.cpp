@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include <nlohmann/json.hpp>
+#include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
 #include "identify/loop_analysis.h"
@@ -12,18 +13,46 @@
 
 namespace sinerig::cli {
 
+namespace {
+
+using identify::LoopSignal;
+
+// T comes to 1 where the loop gain is high. A closed loop that was measured was stable, so L has a
+// phase margin above zero, or with the other sign has not.
+bool sign_is_suspect(const FitInput& measured, LoopSignal signal,
+                     const identify::LoopFigures& figures) {
+  const identify::Response& points = measured.response;
+  if (signal == LoopSignal::complementary) return points.front().response.real() < -0.5;
+  if (signal != LoopSignal::loop || !figures.phase_margin) return false;
+  identify::Response other = points;
+  for (identify::ResponsePoint& point : other) point.response = -point.response;
+  const auto negated = identify::analyse_loop(identify::Curve::of_points(other)).phase_margin;
+  return figures.phase_margin->margin_deg.value < 0.0 && negated && negated->margin_deg.value > 0.0;
+}
+
+}  // namespace
+
 int margins_command(const MarginsOptions& options) {
   const identify::LoopSignal signal = identify::loop_signal(options.response);
   const bool plant = signal == identify::LoopSignal::plant;
   if (!plant && has_controller(options.loop))
     throw std::invalid_argument("--response " + options.response +
                                 " holds the controller already; leave it out");
-  const FitInput measured = read_fit_input(options.file, options.channel);
+  FitInput measured = read_fit_input(options.file, options.channel);
+  if (options.loop.hold_hz) take_hold(measured, *options.loop.hold_hz);
+  if (plant) warn_of_unknown_hold(options.loop, measured);
   identify::check_response(measured.response, 2);
+  if (options.negate)
+    for (identify::ResponsePoint& point : measured.response) point.response = -point.response;
   const identify::Curve points =
       plant ? measured_loop(options.loop, measured)
             : identify::loop_from(identify::Curve::of_points(measured.response), signal);
   const identify::LoopFigures of_points = identify::analyse_loop(points);
+  if (sign_is_suspect(measured, signal, of_points))
+    spdlog::warn("{}: this loop stood while it was measured, but not with this sign; {}",
+                 measured.label,
+                 options.negate ? "leave --negate out"
+                                : "a response measured as minus L or minus T wants --negate");
 
   const double rate_hz = plant ? loop_rate_hz(options.loop, measured) : 0.0;
   nlohmann::ordered_json json{{"label", measured.label},
@@ -38,7 +67,9 @@ int margins_command(const MarginsOptions& options) {
     std::cout << "; in brackets 95 % intervals\n\n";
   }
   if (plant && !options.points_only) {
-    const PlantModel model = read_plant_model(options.file, options.channel, options.refit);
+    PlantModel model =
+        read_plant_model(options.file, options.channel, options.refit, options.loop.hold_hz);
+    if (options.negate) model.zpk.gain = -model.zpk.gain;
     std::optional<bool> stable;
     if (options.loop.controller_file.empty())
       stable = model_loop(options.loop, model).closed_loop_stable();

@@ -11,6 +11,7 @@ struct MarginsOptions {
   std::string file;                // sweep file or CSV
   std::string response = "plant";  // what was measured: plant loop sensitivity complementary
   LoopOptions loop;
+  bool negate = false;  // the response was measured with the other sign
   std::string channel;
   bool points_only = false;
   bool refit = false;

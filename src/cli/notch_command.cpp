@@ -123,8 +123,9 @@ NotchedLoop design_notches(const NotchOptions& options) {
     throw std::invalid_argument("notch needs the controller as a transfer function or PID");
   std::vector<PlantModel> plants;
   for (const std::string& file : options.files)
-    plants.push_back(read_plant_model(file, options.channel, options.refit));
+    plants.push_back(read_plant_model(file, options.channel, options.refit, options.loop.hold_hz));
   const PlantModel& plant = plants.front();
+  warn_of_unknown_hold(options.loop, plant.measured);
   const auto [bits, fraction_bits] = fixed_format(options.fixed);
 
   LoopOptions loop_options = options.loop;

@@ -1,5 +1,8 @@
 #include "cli/plant_model.h"
 
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
 #include <numbers>
 #include <optional>
 
@@ -56,33 +59,76 @@ void read_json(const Json& json, PlantModel& model) {
     throw InputError("the covariance does not belong to the roots");
 }
 
-std::string fitted(const std::string& file, const std::string& channel) {
+std::string fitted(const std::string& file, const std::string& channel, const std::string& hold,
+                   bool store) {
   FitCommandOptions options;
   options.files = {file};
   options.channel = channel;
+  options.hold = hold;
+  options.stable_in_open_loop = true;
+  options.no_store = !store;
   const report::FitReport report = fit_files(options);
   if (!report.fit.converged) spdlog::warn("the fit has not converged: {}", report.fit.reason);
   return report::fit_json(report);
 }
 
+std::string hold_text(double rate_hz) {
+  if (!(rate_hz > 0.0)) return "none";
+  char text[40];
+  std::snprintf(text, sizeof text, "%.17g", rate_hz);
+  return text;
+}
+
+// A model that still has the hold in it gets it twice where a loop puts its own in front.
+bool same_hold(const std::string& fit, double rate_hz) {
+  const Json json = Json::parse(fit, nullptr, false);
+  if (!json.is_object() || !json.contains("hold_period_s")) return true;
+  const double held = number_or_zero(json["hold_period_s"]) * rate_hz;
+  return rate_hz > 0.0 ? std::abs(held - 1.0) < 1e-9 : number_or_zero(json["hold_period_s"]) == 0.0;
+}
+
+void warn_of_stored(const std::string& file, const Json& json, const PlantModel& model) {
+  if (json.contains("converged") && json["converged"] == false)
+    spdlog::warn("the stored fit of {} has not converged; --refit makes another", file);
+  const bool grows = std::any_of(model.zpk.poles.begin(), model.zpk.poles.end(),
+                                 [](std::complex<double> pole) { return pole.real() > 0.0; });
+  if (grows && model.measured.driven_by_command)
+    spdlog::warn(
+        "the stored fit of {} is unstable, but what was swept in open loop without running away is "
+        "not: what follows misleads; --refit keeps the poles in the left half plane",
+        file);
+}
+
 }  // namespace
 
-PlantModel read_plant_model(const std::string& file, const std::string& channel, bool refit) {
+PlantModel read_plant_model(const std::string& file, const std::string& channel, bool refit,
+                            std::optional<double> hold_hz) {
   PlantModel model;
   model.measured = read_fit_input(file, channel);
+  if (hold_hz) take_hold(model.measured, *hold_hz);
   std::optional<std::string> json;
   if (model.measured.sweep_file && !refit)
     json = record::last_fit(file, model.measured.input, model.measured.output);
-  if (!json) {
-    if (!refit) spdlog::info("{} holds no fit; fitting it first, order chosen by itself", file);
-    json = fitted(file, channel);
+  bool store = !hold_hz;
+  if (json && !same_hold(*json, model.measured.hold_hz)) {
+    spdlog::info(
+        "the stored fit of {} was made with another hold than that of its loop; fitting it again "
+        "for this loop, --refit stores the new fit",
+        file);
+    json.reset();
+    store = false;
+  } else if (!json && !refit) {
+    spdlog::info("{} holds no fit; fitting it first, order chosen by itself", file);
   }
+  const bool stored = json.has_value();
+  if (!json) json = fitted(file, channel, hold_text(model.measured.hold_hz), store);
   const Json parsed = Json::parse(*json, nullptr, false);
   try {
     read_json(parsed, model);
   } catch (const std::exception&) {
     throw InputError(file + ": its stored fit lacks what is needed; make a new one with --refit");
   }
+  if (stored) warn_of_stored(file, parsed, model);
   return model;
 }
 

@@ -2,6 +2,7 @@
 // new one.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,10 @@ struct PlantModel {
 
 // FILE is a sweep file or CSV. Its latest maximum-likelihood fit is used; without one, or with
 // refit, it is fitted first with `sinerig fit`'s defaults, and that is said (and stored in a sweep
-// file). Throws as fit_command does.
-PlantModel read_plant_model(const std::string& file, const std::string& channel, bool refit);
+// file). hold_hz: rate of the hold the file was measured behind, 0 for none, where the file does
+// not say it or is wrong. A stored fit made with another hold is not used: the model has to be the
+// bare plant. Throws as fit_command does.
+PlantModel read_plant_model(const std::string& file, const std::string& channel, bool refit,
+                            std::optional<double> hold_hz = {});
 
 }  // namespace sinerig::cli

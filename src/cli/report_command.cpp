@@ -8,9 +8,9 @@
 #include "cli/chosen_response.h"
 #include "cli/commands.h"
 #include "cli/loop_panel.h"
+#include "cli/measured_run.h"
 #include "cli/output_file.h"
 #include "cli/report_file.h"
-#include "record/measured.h"
 #include "report/figure.h"
 #include "report/raster.h"
 
@@ -37,7 +37,7 @@ int report_command(const ReportOptions& options) {
   }
   if (options.format == "png" && !report::has_raster()) report::png_from_svg("", png_scale);
   const report::LabelledRun run{.label = fs::path{options.file}.stem().string(),
-                                .run = record::read_measured(options.file)};
+                                .run = read_run(options.file)};
   const std::string path =
       options.output.empty()
           ? fs::path{options.file}.replace_extension("." + options.format).string()

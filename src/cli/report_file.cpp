@@ -4,8 +4,8 @@
 #include <fstream>
 #include <ostream>
 
+#include "cli/measured_run.h"
 #include "cli/output_file.h"
-#include "record/measured.h"
 #include "report/html.h"
 
 namespace sinerig::cli {
@@ -26,7 +26,7 @@ bool is_report(const std::string& path) {
 void write_report(const std::string& sweep_file, const std::string& path, bool force,
                   const nlohmann::ordered_json& loop) {
   const report::LabelledRun run{.label = fs::path{sweep_file}.stem().string(),
-                                .run = record::read_measured(sweep_file)};
+                                .run = read_run(sweep_file)};
   write_file(path, force || is_report(path),
              [&](std::ostream& stream) { report::write_html(stream, run, loop); });
 }

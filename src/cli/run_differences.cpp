@@ -32,6 +32,7 @@ std::vector<Difference> differences_of(const std::vector<report::LabelledRun>& r
         continue;
       }
       Difference difference = compare_responses(response, *other, settings);
+      difference.file = runs[i].label;
       difference.name = runs[i].label + " " + name;
       differences.push_back(std::move(difference));
     }

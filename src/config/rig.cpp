@@ -212,9 +212,29 @@ MotionLimits read_motion(const Section& limits) {
   return motion;
 }
 
+// Names and units go into files and tables where these end a field, a line or a name.
+bool ends_a_field(const std::string& text) {
+  return std::any_of(text.begin(), text.end(), [](char each) {
+    return each == ',' || each == '"' || static_cast<unsigned char>(each) < 0x20 || each == 0x7F;
+  });
+}
+
+void check_sensor_name(const Section& section, const std::string& name) {
+  if (name.empty()) section.refuse("name", "the sensor has no name; call it [sensor.NAME]");
+  if (name == "applied" || name == "command")
+    section.refuse("name",
+                   "\"" + name + "\" is the name of a channel that every rig has; choose another");
+  if (ends_a_field(name) || name.find('/') != std::string::npos)
+    section.refuse(
+        "name", "a sensor's name must be without commas, quotes, slashes and control characters");
+}
+
 Channel read_channel(const Section& section, const std::string& name) {
+  std::string unit = section.text("unit", "1");
+  if (ends_a_field(unit))
+    section.refuse("unit", "must be without commas, quotes and control characters");
   return {.name = name,
-          .unit = section.text("unit", "1"),
+          .unit = std::move(unit),
           .driver = section.text("driver", "sim"),
           .section = section};
 }
@@ -269,7 +289,9 @@ Rig read_rig(std::unique_ptr<RigFile> file) {
   const Section limits = file->section("limits");
   Rig rig{.file = nullptr, .actuator = read_channel(file->section("actuator"), "command")};
   for (const Section& section : file->children("sensor")) {
-    rig.sensors.push_back(read_channel(section, section.name().substr(sizeof "sensor")));
+    const std::string name = section.name().substr(sizeof "sensor");
+    check_sensor_name(section, name);
+    rig.sensors.push_back(read_channel(section, name));
     rig.sensors.back().health = section.flag("health", false);
   }
   if (rig.sensors.empty()) {

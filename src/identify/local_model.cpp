@@ -183,20 +183,22 @@ MatrixXd LocalModel::jacobian() const {
 // of the plain response, so the exact ones replace them, by central differences.
 void LocalModel::add_hold_sensitivity(MatrixXd& J) const {
   // With columns of size one, the rounding of the residual (1e-13 of its scale) over the step and
-  // the curvature times the step squared balance near 1e-4.
+  // the curvature times the step squared balance near 1e-4. The scale is that of H over its
+  // scatter.
   constexpr double relative_step = 1e-4;
   VectorXd step = VectorXd::Zero(J.cols());
   for (Index column = 0; column < J.cols(); ++column) {
     const double size = std::max(J.col(column).norm(), 1e-300);
     const double width =
-        relative_step / size * std::sqrt(static_cast<double>(J.rows())) * data_.sigma.minCoeff();
+        relative_step / size * std::sqrt(static_cast<double>(J.rows())) / data_.sigma.maxCoeff();
     const auto at = [&](double signed_width) {
       VectorXd one = step;
       one[column] = signed_width;
       return whitened(data_, response(stepped(one)));
     };
     const VectorXd exact = (at(width) - at(-width)) / (2.0 * width);
-    if (exact.allFinite()) J.col(column) = exact;
+    // The hold takes a delay within 1e-9 of whole ticks as whole: a step within that moves nothing.
+    if (exact.allFinite() && exact.norm() > 0.0) J.col(column) = exact;
   }
 }
 

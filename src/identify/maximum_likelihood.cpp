@@ -10,7 +10,7 @@
 #include "identify/constraints.h"
 #include "identify/fit_result.h"
 #include "identify/fit_setup.h"
-#include "identify/hold_model.h"
+#include "identify/hold_images.h"
 #include "identify/robust.h"
 #include "identify/search.h"
 
@@ -25,13 +25,6 @@ struct Solution {
   Refined refined;
   std::vector<Index> outliers;
 };
-
-Eigen::ArrayXcd model_on_grid(const FitData& data, const GridRational& rational) {
-  Eigen::ArrayXcd model = data.known * rational.N / rational.D;
-  for (Index i = 0; i < model.size(); ++i)
-    model[i] *= std::polar(1.0, -data.omega[i] * rational.delay_s);
-  return model;
-}
 
 Solution search_with_outliers(const FitData& data, const Freedom& freedom,
                               const FitOptions& options) {
@@ -99,15 +92,11 @@ constexpr int image_passes = 4;
 void include_hold(Solution& solution, Freedom& freedom, const HoldModel& hold) {
   const Eigen::ArrayXcd without_images = solution.data.known;
   for (int pass = 0; pass < image_passes; ++pass) {
-    const LocalModel model(solution.data, freedom, solution.refined.rational);
-    const LocalModel::Parameters& at = model.parameters();
-    const Eigen::ArrayXcd exact =
-        hold.response(model.N_basis(), at.n, model.D_basis(), at.d, at.delay_s, solution.data);
     FitData plain = solution.data;
     plain.known = without_images;
-    const Eigen::ArrayXcd images = exact / model_on_grid(plain, model.on_grid());
-    if (!images.allFinite()) break;
-    solution.data.known = without_images * images;
+    const auto images = hold_images(plain, freedom, solution.refined.rational, hold);
+    if (!images) break;
+    solution.data.known = without_images * *images;
     refine_again(solution, freedom);
   }
   freedom.hold = &hold;

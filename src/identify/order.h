@@ -29,6 +29,7 @@ struct OrderCandidate {
   double chi2 = 0.0;
   double criterion = 0.0;  // what is minimised, see select_order
   bool explained = false;  // χ² is what noise alone leaves (scatter known)
+  bool at_limit = false;   // a root is held on the edge of what stable or minimum_phase allows
 };
 
 struct OrderSelection {
@@ -41,7 +42,8 @@ struct OrderSelection {
 // poles) is explained by the scatter; then all structures of that order and the two above it.
 // Criterion: χ² + p·(ln(2g) + 4) with known scatter (BIC and the price of many candidates, p free
 // parameters, g points); where nothing is explained, or the scatter is unknown,
-// 2g·ln(χ²/2g) + p·(ln(2g) + 4), the same with the noise unknown.
+// 2g·ln(χ²/2g) + p·(ln(2g) + 4), the same with the noise unknown. χ² is that of the model with its
+// hold and within its constraints; structures that only a constraint holds come last.
 // Throws std::invalid_argument as fit_maximum_likelihood does, and when no order is possible.
 OrderSelection select_order(const Response& response, const OrderSettings& settings);
 

@@ -150,7 +150,9 @@ std::vector<double> standard_errors(
   for (const auto& direction : factor.colwise()) {
     const double change = largest_relative_change(model, covariance.reference_rad_s, direction);
     if (change == 0.0) continue;
-    const double width = std::isfinite(change) ? difference_step / change : none;
+    // A covariance that is not finite says nothing, and no model can be moved along it.
+    if (!std::isfinite(change)) return std::vector<double>(variance.size(), none);
+    const double width = difference_step / change;
     std::vector<double> ahead;
     std::vector<double> behind;
     try {

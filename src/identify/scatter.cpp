@@ -32,6 +32,22 @@ ResponsePoint averaged(const ResponsePoint& a, const ResponsePoint& b) {
   return {a.omega_rad_s, {mean[0], mean[1]}, covariance(0, 0), covariance(0, 1), covariance(1, 1)};
 }
 
+// The variance of a point whose neighbourhood has none is that of the nearest that has.
+void fill_in(Response& pooled) {
+  const Response known = pooled;
+  const auto has = [&](std::size_t i) {
+    return known[i].variance_re > 0.0;
+  };
+  for (std::size_t i = 0; i < known.size(); ++i) {
+    for (std::size_t away = 1; away < known.size() && !(pooled[i].variance_re > 0.0); ++away) {
+      const bool below = i >= away && has(i - away);
+      if (!below && (i + away >= known.size() || !has(i + away))) continue;
+      const double variance = known[below ? i - away : i + away].variance_re;
+      pooled[i].variance_re = pooled[i].variance_im = variance;
+    }
+  }
+}
+
 }  // namespace
 
 Response pooled_scatter(const Response& response, const std::vector<double>& degrees_of_freedom) {
@@ -49,6 +65,7 @@ Response pooled_scatter(const Response& response, const std::vector<double>& deg
     pooled[i].variance_re = pooled[i].variance_im = weights > 0.0 ? sum / weights : 0.0;
     pooled[i].covariance = 0.0;
   }
+  fill_in(pooled);
   return pooled;
 }
 

@@ -11,7 +11,8 @@ namespace sinerig::identify {
 // follows the points that happened to repeat well. Each point gets the mean of its own scatter and
 // its neighbours', three on either side, weighted by their degrees of freedom, equal in re and im.
 // degrees_of_freedom: one per point; 0 where the scatter is not known, such points take the
-// neighbours'. When no point within reach has any, the point comes back without.
+// neighbours'; where those have none either, the nearest that has one gives it. When no point has
+// any, all come back without.
 Response pooled_scatter(const Response& response, const std::vector<double>& degrees_of_freedom);
 
 // Several measurements of one response as one: points at the same frequency (to 1e-9) are averaged,

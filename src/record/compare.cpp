@@ -12,6 +12,8 @@ namespace sinerig::record {
 namespace {
 
 constexpr double frequency_tolerance = 1e-6;
+// A text format writes twelve digits or so: the same run read back is not another one.
+constexpr double rounding = 1e-10;
 
 bool usable(const StoredPoint& point) {
   const bool trusted = point.status == "good" || point.status == "imported";
@@ -27,8 +29,13 @@ struct JointScatter {
 JointScatter joint_scatter(const StoredPoint& a, const StoredPoint& b) {
   const double va = circular_variance(a);
   const double vb = circular_variance(b);
+  // Where only one file carries its scatter the other's is taken to be as large.
+  if (!std::isfinite(va) && !std::isfinite(vb)) return {};
+  if (!std::isfinite(va) || !std::isfinite(vb)) {
+    const bool first = std::isfinite(va);
+    return {.variance = 2.0 * (first ? va : vb), .degrees = first ? a.dof : b.dof};
+  }
   const double sum = va + vb;
-  if (!std::isfinite(sum)) return {};
   const double spread = va * va / a.dof + vb * vb / b.dof;
   return {.variance = sum,
           .degrees = spread > 0.0 ? sum * sum / spread : std::numeric_limits<double>::infinity()};
@@ -48,6 +55,7 @@ PointDifference difference(const StoredPoint& a, const StoredPoint& b) {
   const std::complex<double> ratio = b.response / a.response;
   result.gain_db = 20.0 * std::log10(std::abs(ratio));
   result.phase_deg = std::arg(ratio) * degrees_per_radian;
+  result.relative = std::abs(ratio - 1.0);
   const JointScatter scatter = joint_scatter(a, b);
   const double size = std::min(std::abs(a.response), std::abs(b.response));
   const double half = student_t_975(scatter.degrees) * std::sqrt(scatter.variance) / size;
@@ -62,6 +70,11 @@ bool same_frequency(double a, double b) {
 }
 
 }  // namespace
+
+bool Difference::scatter_known() const {
+  return std::any_of(points.begin(), points.end(),
+                     [](const auto& each) { return !std::isnan(each.probability); });
+}
 
 std::size_t Difference::changed_points() const {
   return static_cast<std::size_t>(
@@ -85,6 +98,7 @@ Difference compare_responses(const StoredResponse& first, const StoredResponse& 
       result.points.push_back(difference(a, b));
     } else {
       ++result.unusable;
+      if (usable(a)) ++result.lost;
     }
     ++i;
     ++k;
@@ -97,7 +111,7 @@ Difference compare_responses(const StoredResponse& first, const StoredResponse& 
     const bool beyond = std::abs(point.gain_db) > settings.tolerance_db ||
                         std::abs(point.phase_deg) > settings.tolerance_deg;
     const bool explained = !std::isnan(point.probability) && point.probability >= threshold;
-    point.changed = beyond && !explained;
+    point.changed = beyond && !explained && point.relative > rounding;
   }
   return result;
 }

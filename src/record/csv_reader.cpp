@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 
+#include "record/csv_text.h"
 #include "record/point_columns.h"
 
 namespace sinerig::record {
@@ -16,42 +17,15 @@ namespace {
 
 constexpr double radians_per_degree = std::numbers::pi / 180.0;
 
-std::string trimmed(const std::string& text) {
-  const auto first = text.find_first_not_of(" \t\r");
-  if (first == std::string::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
-
-std::vector<std::string> fields_of(const std::string& line) {
-  const char separator = line.find(',') != std::string::npos   ? ','
-                         : line.find(';') != std::string::npos ? ';'
-                                                               : '\t';
-  std::vector<std::string> fields;
-  std::size_t begin = 0;
-  while (true) {
-    const std::size_t end = line.find(separator, begin);
-    fields.push_back(trimmed(line.substr(begin, end - begin)));
-    if (end == std::string::npos) return fields;
-    begin = end + 1;
-  }
-}
-
-bool is_number(const std::string& text) {
-  if (text.empty()) return false;
-  char* end = nullptr;
-  std::strtod(text.c_str(), &end);
-  return *end == '\0';
-}
-
 // "# output: encoder [rad]" → {encoder, rad}.
 bool read_channel(const std::string& remark, const std::string& key, ChannelInfo& channel) {
   if (remark.rfind(key, 0) != 0) return false;
-  const std::string rest = trimmed(remark.substr(key.size()));
+  const std::string rest = trimmed_field(remark.substr(key.size()));
   const std::size_t open = rest.rfind('[');
   if (open == std::string::npos || rest.back() != ']') {
     channel = {rest, ""};
   } else {
-    channel = {trimmed(rest.substr(0, open)), rest.substr(open + 1, rest.size() - open - 2)};
+    channel = {trimmed_field(rest.substr(0, open)), rest.substr(open + 1, rest.size() - open - 2)};
   }
   return true;
 }
@@ -116,6 +90,11 @@ StoredPoint point_of(const Row& row) {
   return point;
 }
 
+double hold_rate_of(const Row& row) {
+  const double rate_hz = row.number("hold_rate_hz");
+  return rate_hz > 0.0 && std::isfinite(rate_hz) ? rate_hz : 0.0;
+}
+
 void check_columns(const std::map<std::string, std::size_t>& columns, const std::string& place) {
   const auto has = [&](const char* name) {
     return columns.contains(name);
@@ -136,15 +115,22 @@ void check_columns(const std::map<std::string, std::size_t>& columns, const std:
 ImportedResponse read_csv(const std::string& path) {
   std::ifstream stream{path};
   if (!stream) throw SweepFileError(path + ": cannot be read");
-  ImportedResponse response{.input = {"applied", ""}, .output = {"output", ""}, .points = {}};
+  ImportedResponse response;
+  response.input = {"applied", ""};
+  response.output = {"output", ""};
   std::map<std::string, std::size_t> columns;
   std::string line;
   for (int number = 1; std::getline(stream, line); ++number) {
     const std::string place = path + ":" + std::to_string(number);
-    line = trimmed(line);
+    if (number == 1) drop_byte_order_mark(line);
+    if (line.find('\0') != std::string::npos)
+      throw SweepFileError(place + ": holds binary data; wanted text");
+    // The quotes of a line are those of its fields.
+    const std::size_t content = line.find_first_not_of(" \t\r\f\v");
+    line = content == std::string::npos ? std::string{} : line.substr(content);
     if (line.empty()) continue;
     if (line.front() == '#') {
-      const std::string remark = trimmed(line.substr(1));
+      const std::string remark = trimmed_field(line.substr(1));
       if (!read_channel(remark, "input:", response.input))
         read_channel(remark, "output:", response.output);
       continue;
@@ -161,6 +147,7 @@ ImportedResponse read_csv(const std::string& path) {
     }
     const Row row{columns, std::move(fields), place};
     if (response.points.empty()) {
+      if (row.has("hold_rate_hz")) response.hold_rate_hz = hold_rate_of(row);
       if (row.has("input")) response.input = {row.text("input"), row.text("input_unit")};
       if (row.has("output")) response.output = {row.text("output"), row.text("output_unit")};
     }

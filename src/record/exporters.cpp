@@ -7,6 +7,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "record/csv_text.h"
 #include "record/point_columns.h"
 
 namespace sinerig::record {
@@ -147,8 +148,7 @@ std::string legend(const ChannelInfo& input, const ChannelInfo& output) {
   };
   std::string text = std::string{response_convention} + "; re and im in " + unit(output) + " per " +
                      unit(input) + "; intervals are half widths of 95 %";
-  std::replace(text.begin(), text.end(), ',', ';');
-  return text;
+  return as_field(text);
 }
 
 }  // namespace
@@ -158,8 +158,11 @@ void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse&
   const ChannelInfo& output = run.channels.at(response.output);
   stream << "freq_hz,re,im,gain_db,phase_deg,var_re,cov_re_im,var_im";
   for (const PointColumn& column : point_columns) stream << ',' << column.name;
-  stream << ",status,reason,settled_by,input,output,input_unit,output_unit,"
-         << legend(input, output) << '\n';
+  stream << ",status,reason,settled_by,input,output,input_unit,output_unit,";
+  // Left out where it is not known: Octave's importdata takes an empty column for an error.
+  const bool held = response.hold_rate_hz > 0.0;
+  if (held) stream << "hold_rate_hz,";
+  stream << legend(input, output) << '\n';
   const std::vector<double> phase = unwrapped_phase(response.points);
   for (std::size_t i = 0; i < response.points.size(); ++i) {
     const StoredPoint& point = response.points[i];
@@ -170,9 +173,11 @@ void write_csv(std::ostream& stream, const StoredRun& run, const StoredResponse&
       stream << field(value) << ',';
     }
     for (const PointColumn& column : point_columns) stream << field(point.*column.value) << ',';
-    stream << point.status << ',' << point.reason << ',' << point.settled_by << ',' << input.name
-           << ',' << output.name << ',' << input.unit << ',' << output.unit << ',' << output.name
-           << '/' << input.name << '\n';
+    stream << point.status << ',' << point.reason << ',' << point.settled_by << ','
+           << as_field(input.name) << ',' << as_field(output.name) << ',' << as_field(input.unit)
+           << ',' << as_field(output.unit) << ',';
+    if (held) stream << field(response.hold_rate_hz) << ',';
+    stream << as_field(output.name) << '/' << as_field(input.name) << '\n';
   }
 }
 

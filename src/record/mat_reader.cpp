@@ -134,6 +134,14 @@ ChannelInfo channel_of(const Variables& variables, const std::string& side, std:
   return {name.empty() ? otherwise : name, index < units.size() ? units[index] : ""};
 }
 
+// An array of pairs has a place for those that were not measured, too: NaN, and no status.
+bool measured(const std::vector<StoredPoint>& points) {
+  return std::any_of(points.begin(), points.end(), [](const StoredPoint& point) {
+    const bool stated = !point.status.empty() && point.status != "imported";
+    return stated || !std::isnan(point.response.real()) || !std::isnan(point.response.imag());
+  });
+}
+
 }  // namespace
 
 std::vector<ImportedResponse> read_mat(const std::string& path) {
@@ -150,6 +158,7 @@ std::vector<ImportedResponse> read_mat(const std::string& path) {
   const Shape shape = shape_of(variables, response, frequency.size());
   const Figures figures = figures_of(variables, response, shape);
   if (figures.response.size() != shape.size()) variables.refuse("ResponseData is not numeric");
+  const std::vector<double> hold_rates = real_values(variables.find("HoldRate"));
   std::vector<ImportedResponse> responses;
   for (std::size_t input = 0; input < shape.inputs; ++input) {
     for (std::size_t output = 0; output < shape.outputs; ++output) {
@@ -159,14 +168,19 @@ std::vector<ImportedResponse> read_mat(const std::string& path) {
           .input = channel_of(variables, "Input", input,
                               shape.inputs > 1 ? "input" + std::to_string(input + 1) : "applied"),
           .output = channel_of(variables, "Output", output, otherwise),
-          .points = {}};
+          .points = {},
+          .hold_rate_hz = 0.0,
+          .left_out = 0};
+      if (hold_rates.size() == shape.outputs * shape.inputs)
+        each.hold_rate_hz = std::max(hold_rates[input * shape.outputs + output], 0.0);
       for (std::size_t k = 0; k < shape.length; ++k) {
         each.points.push_back(point_of(figures, shape.at(output, input, k), shape.size()));
         each.points.back().frequency_hz = frequency[k] * hz;
       }
-      responses.push_back(std::move(each));
+      if (measured(each.points)) responses.push_back(std::move(each));
     }
   }
+  if (responses.empty()) variables.refuse("ResponseData has no value that is a number");
   return responses;
 }
 

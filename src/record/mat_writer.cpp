@@ -29,10 +29,12 @@ class Grid {
       : outputs_{distinct(responses, &StoredResponse::output)},
         inputs_{distinct(responses, &StoredResponse::input)},
         length_{responses.front()->points.size()},
-        points_(outputs_.size() * inputs_.size() * length_, nullptr) {
+        points_(outputs_.size() * inputs_.size() * length_, nullptr),
+        hold_rates_(outputs_.size() * inputs_.size(), 0.0) {
     for (const StoredResponse* response : responses) {
       const std::size_t row = place(outputs_, response->output);
       const std::size_t column = place(inputs_, response->input);
+      hold_rates_[column * outputs_.size() + row] = response->hold_rate_hz;
       for (std::size_t k = 0; k < length_; ++k)
         points_[(k * inputs_.size() + column) * outputs_.size() + row] = &response->points[k];
     }
@@ -42,6 +44,9 @@ class Grid {
   const std::vector<std::uint32_t>& inputs() const { return inputs_; }
   Dimensions dimensions() const { return {outputs_.size(), inputs_.size(), length_}; }
   const std::vector<const StoredPoint*>& points() const { return points_; }
+
+  // Hz, of the zero-order hold of each pair, 0 where there is none.
+  const std::vector<double>& hold_rates() const { return hold_rates_; }
 
   template <typename Value>
   std::vector<double> numbers(Value value) const {
@@ -68,6 +73,7 @@ class Grid {
   std::vector<std::uint32_t> inputs_;
   std::size_t length_;
   std::vector<const StoredPoint*> points_;
+  std::vector<double> hold_rates_;
 };
 
 void refuse_different_grids(const std::string& path,
@@ -138,6 +144,7 @@ void write_mat(const std::string& path, const StoredRun& run,
   write(mat_array("Frequency", {frequency.size(), 1}, frequency));
   write(mat_text("FrequencyUnit", "Hz"));
   write(mat_array("CovarianceData", with_covariance, covariance_data(grid)));
+  write(mat_array("HoldRate", {grid.outputs().size(), grid.inputs().size()}, grid.hold_rates()));
   write(mat_array("Ts", {1, 1}, std::vector<double>{0.0}));
   write_channels(file.get(), run, grid);
   for (const PointColumn& column : point_columns) {

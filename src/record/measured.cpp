@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <filesystem>
 #include <limits>
 
@@ -37,6 +38,17 @@ std::uint32_t channel_index(std::vector<ChannelInfo>& channels, const ChannelInf
   return static_cast<std::uint32_t>(channels.size() - 1);
 }
 
+// A point at DC, at a negative frequency or at none has no place on a logarithmic axis nor in a
+// fit.
+void leave_out_unusable(std::vector<ImportedResponse>& responses, const std::string& path) {
+  for (ImportedResponse& response : responses)
+    response.left_out += std::erase_if(response.points, [](const StoredPoint& point) {
+      return !(point.frequency_hz > 0.0) || !std::isfinite(point.frequency_hz);
+    });
+  std::erase_if(responses, [](const ImportedResponse& each) { return each.points.empty(); });
+  if (responses.empty()) throw SweepFileError(path + ": has no point at a frequency above zero");
+}
+
 }  // namespace
 
 StoredPoint imported_point() {
@@ -69,6 +81,7 @@ std::vector<ImportedResponse> import_responses(const std::string& path) {
                          ": the format is told by the extension, which has to be .sweep, .csv, "
                          ".txt, .mat, .uff or .unv");
   }
+  leave_out_unusable(responses, path);
   for (ImportedResponse& response : responses) {
     std::stable_sort(response.points.begin(), response.points.end(),
                      [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
@@ -80,6 +93,9 @@ StoredRun run_of(const std::vector<ImportedResponse>& responses, const std::stri
   StoredRun run;
   run.facts["imported_from"] = fs::path{path}.filename().string();
   run.channels = {{"command", ""}, {"applied", ""}};
+  std::size_t left_out = 0;
+  for (const ImportedResponse& each : responses) left_out += each.left_out;
+  if (left_out > 0) run.facts[left_out_fact] = std::to_string(left_out);
   for (const ImportedResponse& each : responses) {
     StoredResponse response;
     const bool applied = each.input.name.empty() || each.input.name == "applied";
@@ -87,6 +103,8 @@ StoredRun run_of(const std::vector<ImportedResponse>& responses, const std::stri
     response.input = applied ? 1U : channel_index(run.channels, each.input);
     response.output = channel_index(run.channels, each.output);
     response.points = each.points;
+    response.hold_rate_hz = each.hold_rate_hz;
+    run.plan.rate_hz = std::max(run.plan.rate_hz, each.hold_rate_hz);
     for (std::size_t i = 0; i < response.points.size(); ++i) {
       response.points[i].dwell = static_cast<std::uint32_t>(i);
       response.points[i].input = response.input;

@@ -15,8 +15,13 @@ namespace sinerig::record {
 struct ImportedResponse {
   ChannelInfo input;
   ChannelInfo output;
-  std::vector<StoredPoint> points;  // by rising frequency
+  std::vector<StoredPoint> points;  // by rising frequency, all above zero
+  double hold_rate_hz = 0.0;        // of the hold between the two; 0: none, or not said
+  std::size_t left_out = 0;         // points at no frequency above zero
 };
+
+// The fact of a run that says how many of a file's points had no usable frequency.
+inline constexpr const char* left_out_fact = "left_out";
 
 // A point with nothing in it yet.
 StoredPoint imported_point();

@@ -5,6 +5,7 @@
 #include <ostream>
 
 #include "record/point_columns.h"
+#include "record/text.h"
 
 namespace sinerig::record {
 
@@ -39,6 +40,9 @@ void write_remarks(std::ostream& stream, const char* mark, const StoredRun& run,
          << mark << " output: " << output.name << " [" << output.unit << "]\n"
          << mark << " input: " << input.name << " [" << input.unit << "]\n"
          << mark << ' ' << response_convention << '\n';
+  if (response.hold_rate_hz > 0.0)
+    stream << mark
+           << text(" H holds the zero-order hold of a loop at %.10g Hz.\n", response.hold_rate_hz);
 }
 
 }  // namespace
@@ -59,16 +63,24 @@ void write_python_snippet(std::ostream& stream, const StoredRun& run,
   array("cov_re_im", "", [](const auto& p) { return p.covariance.re_im; });
   array("var_im", "", [](const auto& p) { return p.covariance.im_im; });
   array("good", " == 1  # status of the point", is_good);
-  stream << R"py(H = re + 1j * im
-omega = 2 * np.pi * freq_hz  # rad/s
-
+  stream << "H = re + 1j * im\nomega = 2 * np.pi * freq_hz  # rad/s\n";
+  if (response.hold_rate_hz > 0.0)
+    stream << "hold_rate_hz = " << exact(response.hold_rate_hz, "0")
+           << "\nhold = np.sinc(freq_hz / hold_rate_hz) * np.exp(-0.5j * omega / hold_rate_hz)\n";
+  else
+    stream << "hold = 1.0  # none is known between input and output\n";
+  stream << R"py(
 
 def misfit(num, den, delay_s=0.0):
-    """Measured minus model in standard deviations, for the coefficients of scipy.signal."""
+    """Measured minus model in standard deviations, for the coefficients of scipy.signal.
+
+    The model is the plant without the hold of the loop; the factor of the hold is put in front of
+    it here, without its images (a few per cent of G at a tenth of the rate where G falls as 1/w).
+    """
     from scipy import signal
 
     _, G = signal.freqs(num, den, omega)
-    return (H - G * np.exp(-1j * omega * delay_s)) / np.sqrt((var_re + var_im) / 2)
+    return (H - hold * G * np.exp(-1j * omega * delay_s)) / np.sqrt((var_re + var_im) / 2)
 
 
 try:

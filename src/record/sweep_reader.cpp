@@ -211,6 +211,14 @@ StoredRun read_sweep(const std::string& path) {
     run.channels.push_back({.name = channels.text(0), .unit = channels.text(1)});
   run.plan = read_plan(database, std::strtod(run.fact("rate_hz").c_str(), nullptr));
   run.responses = read_responses(database, run.plan.rate_hz);
+  // What drives the plant in another response is on the loop's side of the hold, as the input is:
+  // the sensitivity, torque over applied, has no plant and no hold between the two.
+  for (StoredResponse& response : run.responses) {
+    const bool drives =
+        std::any_of(run.responses.begin(), run.responses.end(),
+                    [&](const StoredResponse& each) { return each.input == response.output; });
+    response.hold_rate_hz = drives ? 0.0 : run.plan.rate_hz;
+  }
   read_more_columns(database, run.responses);
   run.fits = read_fits(database);
   run.events = read_events(database);

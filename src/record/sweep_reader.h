@@ -78,6 +78,7 @@ struct StoredResponse {
   std::uint32_t input = 0;
   std::uint32_t output = 0;
   std::vector<StoredPoint> points;
+  double hold_rate_hz = 0.0;  // of the zero-order hold between the two; 0: none, or not known
 };
 
 struct StoredRun {

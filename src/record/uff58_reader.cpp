@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <numbers>
@@ -95,6 +96,14 @@ ChannelInfo channel_of(const Dataset& data, const std::string& key, std::size_t 
   return channel;
 }
 
+// As the writer puts it into the first identification line; 0 where it is not there.
+double hold_rate_of(const std::string& line) {
+  constexpr const char* key = "sinerig hold_rate_hz=";
+  if (line.rfind(key, 0) != 0) return 0.0;
+  const double rate_hz = std::strtod(line.c_str() + std::string{key}.size(), nullptr);
+  return rate_hz > 0.0 && std::isfinite(rate_hz) ? rate_hz : 0.0;
+}
+
 std::vector<StoredPoint> points_of(const Dataset& data) {
   const Layout layout = layout_of(data);
   const auto count = static_cast<std::size_t>(data.integer(6, 10, 10));
@@ -155,7 +164,9 @@ std::vector<ImportedResponse> read_uff58(const std::string& path) {
     if (data.integer(5, 0, 5) != frequency_response) continue;
     responses.push_back({.input = channel_of(data, "input:", 9),
                          .output = channel_of(data, "output:", 8),
-                         .points = points_of(data)});
+                         .points = points_of(data),
+                         .hold_rate_hz = hold_rate_of(data.lines[0]),
+                         .left_out = 0});
     if (responses.back().input.name.empty()) responses.back().input.name = "applied";
     if (responses.back().output.name.empty()) responses.back().output.name = "output";
   }

@@ -53,8 +53,10 @@ void write_dataset(std::ostream& stream, const StoredRun& run, const StoredRespo
   for (const StoredPoint& point : response.points)
     if (std::isfinite(std::abs(point.response))) points.push_back(&point);
 
+  const std::string hold =
+      response.hold_rate_hz > 0.0 ? text("hold_rate_hz=%.15g ", response.hold_rate_hz) : "";
   stream << "    -1\n    58\n"
-         << id_line("sinerig " + run_name) << id_line(response_convention)
+         << id_line("sinerig " + hold + run_name) << id_line(response_convention)
          << id_line(run.fact("started_utc"))
          << id_line("output: " + output.name + " [" + output.unit + "]")
          << id_line("input: " + input.name + " [" + input.unit + "]")

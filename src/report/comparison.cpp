@@ -17,13 +17,24 @@ using record::PointDifference;
 using record::text;
 
 std::string verdict(const Difference& difference) {
-  std::string words =
-      difference.changed()
-          ? text("changed: %zu of %zu points by more than their scatter explains",
-                 difference.changed_points(), difference.points.size())
-          : text("same: no change in %zu points that their scatter does not explain",
-                 difference.points.size());
-  if (difference.unusable > 0) words += text("; %zu left out, not good", difference.unusable);
+  const std::size_t changed = difference.changed_points();
+  const char* measure =
+      difference.scatter_known() ? "their scatter explains" : "is tolerated (no scatter is known)";
+  std::string words;
+  if (!difference.compared())
+    words = text("%snothing compared, no frequency at which both are good",
+                 difference.changed() ? "changed: " : "");
+  else if (changed > 0)
+    words = text("changed: %zu of %zu points by more than %s", changed, difference.points.size(),
+                 measure);
+  else
+    words = text(difference.scatter_known()
+                     ? "%s: no change in %zu points that their scatter does not explain"
+                     : "%s: no change in %zu points that is not tolerated (no scatter is known)",
+                 difference.changed() ? "changed" : "same", difference.points.size());
+  if (difference.lost > 0) words += text("; %zu were good and are not any more", difference.lost);
+  const std::size_t others = difference.unusable - difference.lost;
+  if (others > 0) words += text("; %zu left out, not good", others);
   if (difference.unmatched > 0) words += text("; %zu in one file only", difference.unmatched);
   return words;
 }
@@ -74,7 +85,9 @@ nlohmann::ordered_json comparison_json(const std::string& first,
                         {"changed", point.changed}});
     }
     list.push_back({{"name", difference.name},
+                    {"compared", difference.points.size()},
                     {"changed", difference.changed()},
+                    {"lost", difference.lost},
                     {"unmatched", difference.unmatched},
                     {"unusable", difference.unusable},
                     {"points", points}});

@@ -17,7 +17,8 @@ namespace sinerig::report {
 void print_comparison(std::ostream& stream, const std::string& first,
                       const std::vector<record::Difference>& differences);
 
-// {reference, changed, differences: [{name, changed, unmatched, unusable, points}], drift}.
+// {reference, changed, differences: [{name, compared, changed, lost, unmatched, unusable, points}],
+// drift}.
 nlohmann::ordered_json comparison_json(const std::string& first,
                                        const std::vector<record::Difference>& differences,
                                        const std::vector<Drift>& drifts);

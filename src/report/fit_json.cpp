@@ -207,7 +207,8 @@ Json candidates_json(const FitReport& report) {
                           {"parameters", c.parameters},
                           {"chi2", c.chi2},
                           {"criterion", c.criterion},
-                          {"explained", c.explained}});
+                          {"explained", c.explained},
+                          {"at_limit", c.at_limit}});
   return candidates;
 }
 

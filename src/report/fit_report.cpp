@@ -68,7 +68,10 @@ void print_candidates(std::ostream& stream, const FitReport& report) {
   for (std::size_t i = 0; i < std::min(report.table.size(), candidates_shown); ++i) {
     const identify::OrderCandidate& c = report.table[i];
     stream << format("  %5d %5d %6d %10d %10.5g %10.5g%s\n", c.poles, c.zeros, c.origin,
-                     c.parameters, c.chi2, c.criterion, i == 0 ? "  chosen" : "");
+                     c.parameters, c.chi2, c.criterion,
+                     i == 0       ? "  chosen"
+                     : c.at_limit ? "  held by its limits"
+                                  : "");
   }
 }
 

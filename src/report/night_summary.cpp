@@ -41,6 +41,7 @@ std::string verdict(const Difference& difference) {
   words +=
       text("; most at %.5g Hz, %+.4f dB ± %.2g, %+.3f° ± %.2g, p %.2g", most->frequency_hz,
            most->gain_db, most->gain95_db, most->phase_deg, most->phase95_deg, most->probability);
+  if (difference.lost > 0) words += text("; %zu not good any more", difference.lost);
   if (difference.unmatched > 0) words += text("; %zu in one of them only", difference.unmatched);
   return words;
 }

@@ -129,6 +129,7 @@ Json response_json(const StoredRun& run, const StoredResponse& response, const s
                    std::size_t run_index) {
   Json json{{"run", run_index},
             {"name", name},
+            {"input", run.channels.at(response.input).name},
             {"unit", response_unit(run, response)},
             {"input_unit", run.channels.at(response.input).unit},
             {"output_unit", run.channels.at(response.output).unit}};
@@ -141,7 +142,10 @@ Json response_json(const StoredRun& run, const StoredResponse& response, const s
 Json difference_json(const record::Difference& difference) {
   Json json{{"name", difference.name},
             {"verdict", std::to_string(difference.changed_points()) + " of " +
-                            std::to_string(difference.points.size()) + " changed"}};
+                            std::to_string(difference.points.size()) + " changed" +
+                            (difference.lost > 0
+                                 ? "; " + std::to_string(difference.lost) + " not good any more"
+                                 : "")}};
   const auto add = [&](const char* key, int digits, auto value) {
     json[key] = Json::array();
     for (const record::PointDifference& point : difference.points)

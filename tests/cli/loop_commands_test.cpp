@@ -21,6 +21,7 @@ namespace {
 
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 constexpr double rate_hz = 1000.0;
 constexpr double turn = 2.0 * 3.14159265358979323846;
@@ -251,6 +252,93 @@ TEST(MarginsCommand, FitsFirstAndSaysSo) {
   EXPECT_THAT(run.errors, HasSubstr("axis.csv holds no fit; fitting it first"));
   EXPECT_THAT(run.output, HasSubstr("model: closed loop stable"));
   EXPECT_THAT(run.output, HasSubstr("interpolated between"));
+}
+
+const std::string config = SINERIG_SOURCE_DIR "/config/";
+
+TEST(MarginsCommand, CountsTheHoldOfAnExportedResponseOnce) {
+  const test::Workshop workshop;
+  ASSERT_EQ(workshop.sinerig("run " + config + "two-mass.toml -o axis.sweep --no-report").exit_code,
+            0);
+  ASSERT_EQ(workshop.sinerig("export axis.sweep --channel motor -o axis.csv").exit_code, 0);
+  ASSERT_EQ(
+      workshop.sinerig("export axis.sweep --channel motor --format uff -o axis.uff").exit_code, 0);
+  // What a program wrote that knows of no hold.
+  ASSERT_EQ(workshop.shell("cut -d, -f1-3,6-8 axis.csv > bare.csv").exit_code, 0);
+  const std::string pid_at = " --json --rate 2000 --pid 0.2,0.5,0.01,20";
+  const auto margin = [&](const std::string& arguments) {
+    const auto run = workshop.sinerig("margins " + arguments + pid_at);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return json::parse(run.output)["model"]["phase_margin"]["margin_deg"]["value"].get<double>();
+  };
+  const double of_sweep = margin("axis.sweep");
+  EXPECT_NEAR(of_sweep, 71.54, 0.1);
+  EXPECT_NEAR(margin("axis.csv"), of_sweep, 0.05);
+  EXPECT_NEAR(margin("axis.uff"), of_sweep, 0.05);
+  EXPECT_NEAR(margin("bare.csv --hold 2000"), of_sweep, 0.05);
+  const auto bare = workshop.sinerig("margins bare.csv" + pid_at);
+  EXPECT_THAT(bare.errors, HasSubstr("does not say the rate of the loop"));
+  ASSERT_EQ(workshop.sinerig("fit axis.sweep --hold none").exit_code, 0);
+  EXPECT_NEAR(margin("axis.sweep"), of_sweep, 0.05);
+}
+
+TEST(MarginsCommand, TakesALoopThatWasMeasuredWithTheOtherSign) {
+  const test::Workshop workshop;
+  ASSERT_EQ(
+      workshop.sinerig("run " + config + "closed-loop.toml -o axis.sweep --no-report").exit_code,
+      0);
+  const std::string loop = "margins axis.sweep --channel control --response loop";
+  const auto wrong = workshop.sinerig(loop);
+  EXPECT_THAT(wrong.errors, HasSubstr("--negate"));
+  const auto right = workshop.sinerig(loop + " --negate");
+  EXPECT_EQ(right.exit_code, 0) << right.errors;
+  EXPECT_THAT(right.errors, Not(HasSubstr("sign")));
+  EXPECT_THAT(right.output, HasSubstr("57.67"));
+  const auto sensitivity = workshop.sinerig("fit axis.sweep --channel torque/applied --json");
+  EXPECT_THAT(sensitivity.errors, HasSubstr("on the loop's side of its hold"));
+  EXPECT_EQ(json::parse(sensitivity.output)["hold_period_s"], 0.0);
+}
+
+TEST(MarginsCommand, KeepsARigThatStoodStable) {
+  const test::Workshop workshop;
+  ASSERT_EQ(workshop.sinerig("run " + config + "servo.toml -o servo.sweep --no-report").exit_code,
+            0);
+  EXPECT_THAT(workshop.sinerig("fit servo.sweep --no-store").errors, HasSubstr("--stable"));
+  const auto margins = workshop.sinerig("margins servo.sweep --pid 0.1,0.5,0");
+  EXPECT_EQ(margins.exit_code, 0) << margins.errors;
+  EXPECT_THAT(margins.errors, HasSubstr("fitting with --stable"));
+  EXPECT_THAT(margins.output, HasSubstr("model: closed loop stable"));
+  ASSERT_EQ(workshop.sinerig("fit servo.sweep --poles 6 --zeros 2").exit_code, 0);
+  EXPECT_THAT(workshop.sinerig("margins servo.sweep --pid 0.1,0.5,0").errors,
+              HasSubstr("the stored fit of servo.sweep is unstable"));
+}
+
+TEST(FitOfASweep, IsDoneWithoutNoise) {
+  const test::Workshop workshop;
+  ASSERT_EQ(
+      workshop.sinerig("run " + config + "chebyshev.toml -o filter.sweep --no-report").exit_code,
+      0);
+  const auto fit = workshop.sinerig("fit filter.sweep --json");
+  ASSERT_EQ(fit.exit_code, 0) << fit.errors;
+  const json model = json::parse(fit.output);
+  ASSERT_EQ(model["den"].size(), 4U);
+  EXPECT_NEAR(model["den"][1].get<double>(), 347.0, 1e-3);
+  EXPECT_NEAR(model["num"].back().get<double>(), 309673.0, 1.0);
+}
+
+// Each file is held against the first; one that shares nothing with it is not the same.
+TEST(CompareCommand, FailsForAFileThatCannotBeCompared) {
+  const test::Workshop workshop;
+  workshop.write("a.csv", "freq_hz,re,im,std\n1,1,0,0.1\n2,1,0,0.1\n");
+  workshop.write("same.csv", "freq_hz,re,im,std\n1,1,0,0.1\n2,1,0,0.1\n");
+  workshop.write("other.csv", "freq_hz,re,im,std\n3,1,0,0.1\n4,1,0,0.1\n");
+  EXPECT_EQ(workshop.sinerig("compare a.csv same.csv").exit_code, 0);
+  const auto run = workshop.sinerig("compare a.csv same.csv other.csv --json");
+  EXPECT_EQ(run.exit_code, 1);
+  EXPECT_THAT(run.errors, HasSubstr("other: nothing to compare"));
+  const json differences = json::parse(run.output)["differences"];
+  EXPECT_EQ(differences[0]["compared"], 2);
+  EXPECT_EQ(differences[1]["compared"], 0);
 }
 
 }  // namespace

@@ -116,6 +116,17 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Change{"RateTooHigh", 2, "rate_hz = 2e5",
                "rig.toml:2: [loop] rate_hz = 2e+05: must be at least 0.1 and at most 100000"},
+        Change{"UnitThatEndsAField", 1, "[sensor.gyro]\nunit = \"rad,s\"\n[loop]",
+               "rig.toml:2: [sensor.gyro] unit = 'rad,s': must be without commas, quotes and "
+               "control characters"},
+        Change{"SensorCalledApplied", 1, "[sensor.applied]\n[loop]",
+               "rig.toml:1: [sensor.applied] name: \"applied\" is the name of a channel that every "
+               "rig has; choose another"},
+        Change{"SensorWithoutAName", 1, "[sensor.\"\"]\n[loop]",
+               "rig.toml:1: [sensor.] name: the sensor has no name; call it [sensor.NAME]"},
+        Change{"SensorWithASlash", 1, "[sensor.\"a/b\"]\n[loop]",
+               "rig.toml:1: [sensor.a/b] name: a sensor's name must be without commas, quotes, "
+               "slashes and control characters"},
         Change{"RateOffItsGrid", 2, "rate_hz = 333.33333",
                "rig.toml:2: [loop] rate_hz = 333.33333: must be a whole number of millihertz"},
         Change{"RateMissing", 2, "",

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "identify/hold.h"
 #include "plants.h"
 
 namespace sinerig::identify {
@@ -65,6 +66,59 @@ TEST(Order, IsFoundInSpiteOfOutliers) {
   const OrderSelection selection = select_order(response, settings);
   EXPECT_EQ(selection.chosen.poles, 7);
   EXPECT_EQ(selection.fit.outliers.size(), 2U);
+}
+
+// The motor of config/two-mass.toml falls as 1/ω: at 250 Hz of 2000 the images of the hold are 2.6
+// %, which a search without them explains by a fast pole that is not there.
+TEST(Order, IsFoundBehindAHoldWhoseImagesAreLarge) {
+  const ZerosPolesGain motor =
+      to_zeros_poles_gain({{250.0, 1875.0, 1.25e7}, {1.0, 22.5, 150062.5, 500000.0}, 0.00075});
+  const double period_s = 1.0 / 2000.0;
+  const std::vector<double> grid =
+      log_grid(2.0 * std::numbers::pi, 2.0 * std::numbers::pi * 250.0, 50);
+  const Eigen::ArrayXcd held =
+      held_response(motor, period_s, Eigen::Map<const Eigen::ArrayXd>(grid.data(), 50));
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    Random random(seed);
+    std::normal_distribution<double> normal(0.0, 0.002);
+    Response response;
+    for (std::size_t i = 0; i < grid.size(); ++i) {
+      const std::complex<double> error{normal(random), normal(random)};
+      response.push_back(point_with_relative_scatter(
+          grid[i], held[static_cast<Eigen::Index>(i)] * (1.0 + error), 0.002));
+    }
+    OrderSettings settings;
+    settings.fit.delay = Delay::fit;
+    settings.fit.hold_period_s = period_s;
+    const OrderSelection selection = select_order(response, settings);
+    EXPECT_EQ(selection.chosen.poles, 3) << "seed " << seed;
+    EXPECT_EQ(selection.chosen.zeros, 2) << "seed " << seed;
+    EXPECT_EQ(selection.chosen.origin, 0) << "seed " << seed;
+    EXPECT_LT(gain_error(selection.fit.zpk, motor, grid).rms_db, 0.02) << "seed " << seed;
+  }
+}
+
+// A dead time that is said to be none pulls poles to the right; asked for stable ones, the
+// structure is chosen among those that are stable without being held so.
+TEST(Order, IsChosenAmongStableModelsWhenThatIsAsked) {
+  ZerosPolesGain plant{{}, {}, 1.0, 0.02};
+  add_pair(plant.poles, 10.0, 0.6);
+  set_static_gain(plant, 1.0);
+  Random random(6);
+  const std::vector<double> grid =
+      log_grid(2.0 * std::numbers::pi * 0.5, 2.0 * std::numbers::pi * 50.0, 40);
+  Response response = noisy_response(plant, grid, 0.003, random);
+  for (ResponsePoint& point : response)
+    point.response *= 1.0 - 0.01 * std::complex<double>{0.0, 1.0} / (0.1 * point.omega_rad_s + 0.3);
+  OrderSettings settings;
+  settings.fit.delay = Delay::none;
+  settings.fit.stable = true;
+  const OrderSelection selection = select_order(response, settings);
+  EXPECT_FALSE(selection.table.front().at_limit);
+  EXPECT_TRUE(selection.fit.converged);
+  EXPECT_EQ(selection.table.front().poles, selection.chosen.poles);
+  EXPECT_DOUBLE_EQ(selection.table.front().chi2, selection.fit.chi2);
+  for (const std::complex<double> pole : selection.fit.zpk.poles) EXPECT_LE(pole.real(), 0.0);
 }
 
 TEST(Order, KeepsThePartsThatAreGiven) {

@@ -16,6 +16,19 @@ TEST(Scatter, PoolsNeighboursByTheirDegreesOfFreedom) {
   }
 }
 
+// Without noise most points do not scatter at all: a fit wants a figure for every point.
+TEST(Scatter, TakesTheNearestThatHasAny) {
+  Response response;
+  for (int i = 0; i < 20; ++i) response.push_back({1.0 + i, 1.0, 0.0, 0.0, 0.0});
+  response[2].variance_re = response[2].variance_im = 4.0;
+  response[17].variance_re = response[17].variance_im = 9.0;
+  const Response pooled = pooled_scatter(response, std::vector<double>(20, 6.0));
+  EXPECT_DOUBLE_EQ(pooled[8].variance_re, 4.0);
+  EXPECT_DOUBLE_EQ(pooled[8].variance_im, 4.0);
+  EXPECT_DOUBLE_EQ(pooled[12].variance_re, 9.0);
+  check_response(pooled, 1);
+}
+
 TEST(Scatter, StaysUnknownWhereNoPointHasAny) {
   const Response pooled = pooled_scatter({{1.0, 1.0, 0, 0, 0}, {2.0, 1.0, 0, 0, 0}}, {0.0, 0.0});
   EXPECT_FALSE(has_scatter(pooled));

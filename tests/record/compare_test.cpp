@@ -77,6 +77,44 @@ TEST(Compare, WithoutScatterOnlyTheTolerancesCount) {
   EXPECT_TRUE(std::isnan(difference.points[4].probability));
 }
 
+TEST(Compare, TakesTheOneScatterThatIsKnown) {
+  std::mt19937_64 random{4};
+  const StoredResponse a = measured(random, 0.01);
+  StoredResponse b = measured(random, 0.01);
+  for (StoredPoint& point : b.points) point.dof = 0.0;
+  const Difference difference = compare_responses(a, b, {});
+  EXPECT_TRUE(difference.scatter_known());
+  EXPECT_FALSE(difference.changed());
+}
+
+TEST(Compare, RoundingOfAFileIsNoChange) {
+  StoredResponse a = test::two_channel_run(10).responses[1];
+  for (StoredPoint& point : a.points) point.dof = 0.0;
+  StoredResponse b = a;
+  for (StoredPoint& point : b.points) point.response *= 1.0 + 1e-13;
+  const Difference difference = compare_responses(a, b, {});
+  EXPECT_FALSE(difference.changed());
+  EXPECT_FALSE(difference.scatter_known());
+}
+
+TEST(Compare, PointsThatCannotBeMeasuredAnyMoreAreAChange) {
+  const StoredResponse a = test::two_channel_run(20).responses[1];
+  StoredResponse b = a;
+  b.points[3].status = "low_signal";
+  const Difference one = compare_responses(a, b, {});
+  EXPECT_EQ(one.lost, 1U);
+  EXPECT_FALSE(one.changed());
+  for (std::size_t i = 0; i < 12; ++i) b.points[i].status = "low_signal";
+  const Difference many = compare_responses(a, b, {});
+  EXPECT_EQ(many.lost, 12U);
+  EXPECT_EQ(many.changed_points(), 0U);
+  EXPECT_TRUE(many.changed());
+  // The other way round they were not there before.
+  EXPECT_FALSE(compare_responses(b, a, {}).changed());
+  for (StoredPoint& point : b.points) point.status = "low_signal";
+  EXPECT_FALSE(compare_responses(a, b, {}).compared());
+}
+
 TEST(Compare, CountsWhatItCannotCompare) {
   const StoredResponse a = test::two_channel_run(20).responses[0];
   StoredResponse b = test::two_channel_run(20).responses[1];

@@ -216,5 +216,70 @@ TEST_F(Formats, ATruncatedUffIsNotHalfARun) {
   EXPECT_THAT(refusal("h.uff", whole_lines), HasSubstr("the data end before the last point"));
 }
 
+// Whoever fits or closes a loop around an exported response has to know the hold that is in it.
+TEST_F(Formats, TheRateOfTheHoldGoesAlong) {
+  run_.responses[0].hold_rate_hz = 0.0;
+  run_.responses[1].hold_rate_hz = 1234.5;
+  std::ofstream csv{path("a.csv")};
+  write_csv(csv, run_, run_.responses[1]);
+  csv.close();
+  EXPECT_EQ(import_responses(path("a.csv"))[0].hold_rate_hz, 1234.5);
+  EXPECT_EQ(read_measured(path("a.csv")).plan.rate_hz, 1234.5);
+  const std::vector<const StoredResponse*> both{&run_.responses[0], &run_.responses[1]};
+  write_mat(path("a.mat"), run_, both);
+  std::ofstream uff{path("a.uff")};
+  write_uff58(uff, run_, both, "a");
+  uff.close();
+  for (const char* name : {"a.mat", "a.uff"}) {
+    const auto back = import_responses(path(name));
+    ASSERT_EQ(back.size(), 2U) << name;
+    EXPECT_EQ(back[0].hold_rate_hz, 0.0) << name;
+    EXPECT_EQ(back[1].hold_rate_hz, 1234.5) << name;
+  }
+}
+
+TEST_F(Formats, PairsThatWereNotMeasuredDoNotComeBack) {
+  run_.responses[1].input = 2;  // gyro over encoder, encoder over applied: two of four places
+  write_mat(path("a.mat"), run_, {&run_.responses[0], &run_.responses[1]});
+  const auto back = import_responses(path("a.mat"));
+  ASSERT_EQ(back.size(), 2U);
+  EXPECT_EQ(back[0].output.name, "encoder");
+  EXPECT_EQ(back[0].input.name, "applied");
+  EXPECT_EQ(back[1].output.name, "gyro");
+  EXPECT_EQ(back[1].input.name, "encoder");
+}
+
+TEST_F(Formats, PointsWithoutAFrequencyAreLeftOutAndCounted) {
+  run_.responses[1].points[0].frequency_hz = 0.0;
+  run_.responses[1].points[1].frequency_hz = -1.0;
+  run_.responses[1].points[2].frequency_hz = std::numeric_limits<double>::infinity();
+  write_mat(path("a.mat"), run_, {&run_.responses[1]});
+  const StoredRun back = read_measured(path("a.mat"));
+  EXPECT_EQ(back.responses[0].points.size(), 17U);
+  EXPECT_EQ(back.fact(left_out_fact), "3");
+  for (StoredPoint& point : run_.responses[1].points) point.frequency_hz = 0.0;
+  write_mat(path("none.mat"), run_, {&run_.responses[1]});
+  EXPECT_THROW(import_responses(path("none.mat")), SweepFileError);
+}
+
+TEST_F(Formats, ANameWithACommaDoesNotShiftTheColumns) {
+  run_.channels[3] = {"gyro, \"left\"", "rad/s, rms"};
+  std::ofstream stream{path("a.csv")};
+  write_csv(stream, run_, run_.responses[1]);
+  stream.close();
+  const auto back = import_responses(path("a.csv"));
+  EXPECT_EQ(back[0].output.name, "gyro; 'left'");
+  EXPECT_EQ(back[0].output.unit, "rad/s; rms");
+  expect_same_points(back[0].points, run_.responses[1].points);
+}
+
+TEST_F(Formats, CsvOfASpreadsheetHasAMarkAndQuotes) {
+  workshop_.write("a.csv", "\xEF\xBB\xBF\"freq_hz\",\"re\",\"im\"\r\n\"1\",2,\"3\"\r\n");
+  const auto back = import_responses(path("a.csv"));
+  ASSERT_EQ(back[0].points.size(), 1U);
+  EXPECT_EQ(back[0].points[0].frequency_hz, 1.0);
+  EXPECT_EQ(back[0].points[0].response, (std::complex<double>{2.0, 3.0}));
+}
+
 }  // namespace
 }  // namespace sinerig::record

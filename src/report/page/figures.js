@@ -238,7 +238,7 @@ function smallPlots(host) {
   if (has('amplitude'))
     simple(
       'amplitude',
-      'Amplitude applied',
+      'Amplitude of ' + [...new Set(shownResponses().map(r => r.input))].join(' and '),
       () => [...new Set(shownResponses().map(r => r.input_unit))].join(' and '),
       r => r.amplitude,
       true,

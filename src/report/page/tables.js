@@ -36,7 +36,7 @@ function readoutRow(r) {
   if (r.snr[i] !== null) pieces.push(`<span><i>SNR</i> ${fixed(r.snr[i], 0)} <i>dB</i></span>`);
   if (r.coherence[i] !== null) pieces.push(`<span><i>coherence</i> ${fixed(r.coherence[i], 6)}</span>`);
   if (r.amplitude[i] !== null)
-    pieces.push(`<span><i>applied</i> ${significant(r.amplitude[i], 3)} <i>${esc(r.input_unit)}</i></span>`);
+    pieces.push(`<span><i>${esc(r.input)}</i> ${significant(r.amplitude[i], 3)} <i>${esc(r.input_unit)}</i></span>`);
   if (r.distortion[i] > 0)
     pieces.push(`<span><i>distortion</i> ${significant(100 * r.distortion[i], 2)} <i>%</i></span>`);
   pieces.push(statusText(r, i));
@@ -69,7 +69,7 @@ function pointsTable(r) {
     '± 95 %',
     'SNR dB',
     'coherence',
-    `applied ${r.input_unit}`,
+    `${r.input} ${r.input_unit}`,
     `response ${r.output_unit}`,
     'distortion %',
     'samples',
