@@ -354,8 +354,8 @@ bool WindowEstimator::stray(const Regression& regression, const Window& window,
   };
   const auto spread = [&](std::size_t tone) {
     const std::size_t a = 1 + 2 * tone;
-    return std::max(0.0, late_.spread[a] + late_.spread[a + 1] - whole_.spread[a] -
-                             whole_.spread[a + 1]);
+    return std::max(
+        0.0, late_.spread[a] + late_.spread[a + 1] - whole_.spread[a] - whole_.spread[a + 1]);
   };
   std::fill_n(part_input_.begin(), tones, std::complex<double>{});
   std::fill_n(part_input_noise_.begin(), tones, 0.0);

@@ -153,7 +153,7 @@ class WindowEstimator {
   Plain whole_;
   Plain late_;
   std::vector<std::complex<double>> part_input_;  // per tone
-  std::vector<double> part_input_noise_;  // variance of that
+  std::vector<double> part_input_noise_;          // variance of that
   std::vector<double> column_;
   std::vector<double> moved_output_;
   std::vector<double> moved_input_;
