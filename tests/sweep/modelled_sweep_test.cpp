@@ -101,6 +101,7 @@ TEST(ModelTrust, BelievesNoModesAfterAContradiction) {
 class ToldFinder final : public ModeFinder {
  public:
   bool find(const ProbeRecord& record, KnownModes& modes) noexcept override {
+    const test::OutsideTheLoop looking;
     loudest = 0.0;
     for (const double value : record.applied) loudest = std::max(loudest, std::abs(value));
     modes = *told().modes;
@@ -130,6 +131,7 @@ TEST(ModelledSweep, PlaysItsFirstPassMoreQuietlyAfterASoftLimit) {
 class OrderedSink final : public RecordSink {
  public:
   void put(const Record& record) noexcept override {
+    const test::OutsideTheLoop noting_down;
     if (const auto* timing = std::get_if<DwellTiming>(&record)) {
       told.push_back({.dwell = timing->dwell, .value = -1.0});
     }
