@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/limits.h"
+#include "sweep/asked_frequencies.h"
 #include "sweep/clock.h"
 #include "sweep/records.h"
 

@@ -9,8 +9,8 @@
 #include "config/section.h"
 #include "realtime/rights.h"
 #include "sweep/guard.h"
-#include "sweep/plan.h"
 #include "sweep/runner.h"
+#include "sweep/sweep_settings.h"
 
 namespace sinerig::config {
 

@@ -8,6 +8,7 @@
 
 #include "record/text.h"
 #include "report/run_parts.h"
+#include "sweep/asked_frequencies.h"
 
 namespace sinerig::report {
 

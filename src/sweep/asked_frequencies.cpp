@@ -1,6 +1,6 @@
-#include <cmath>
+#include "sweep/asked_frequencies.h"
 
-#include "sweep/plan.h"
+#include <cmath>
 
 namespace sinerig {
 

@@ -37,12 +37,7 @@ WindowEstimator::WindowEstimator(std::size_t max_bins)
       cluster_{2 + 2 * max_bins},
       stairs_{2 + 2 * max_bins},
       drift_products_(2 + 2 * max_bins),
-      plain_solver_{1 + 2 * max_bins},
-      plain_gram_(triangle(1 + 2 * max_bins)),
-      whole_{1 + 2 * max_bins},
-      late_{1 + 2 * max_bins},
-      part_input_(max_bins),
-      part_input_noise_(max_bins),
+      stray_{max_bins},
       column_(2 + 2 * max_bins),
       moved_output_(2 + 2 * max_bins),
       moved_input_(2 + 2 * max_bins),
@@ -303,81 +298,12 @@ void WindowEstimator::take_clusters(const Regression& regression, const Window& 
   }
 }
 
-// All regressors but the drift and the harmonics.
-std::size_t WindowEstimator::plain_row(std::size_t i) const noexcept {
-  if (i == 0) return Regression::constant_row;
-  const std::size_t skipped = i > 2 * tones_ ? 2 * harmonics_ : 0;
-  return Regression::cosine_row(0) + i - 1 + skipped;
-}
-
-// The sums in cluster_ without drift and harmonics, into plain.
-bool WindowEstimator::fit_plain(std::size_t order, Plain& plain) noexcept {
-  const std::size_t rows = order - 1 - 2 * harmonics_;
-  if (cluster_.count <= static_cast<double>(rows)) return false;
-  for (std::size_t i = 0; i < rows; ++i) {
-    for (std::size_t k = 0; k <= i; ++k) {
-      plain_gram_[triangle(i) + k] = cluster_.gram[triangle(plain_row(i)) + plain_row(k)];
-    }
-    plain.beta[i] = cluster_.moments[plain_row(i)];
-  }
-  if (!plain_solver_.factor(plain_gram_, rows)) return false;
-  plain_solver_.solve(std::span{plain.beta}.first(rows));
-  double explained = 0.0;
-  for (std::size_t i = 0; i < rows; ++i)
-    explained += plain.beta[i] * cluster_.moments[plain_row(i)];
-  plain.variance =
-      std::max(0.0, cluster_.square - explained) / (cluster_.count - static_cast<double>(rows));
-  for (std::size_t row = 1; row <= 2 * tones_; ++row) {
-    std::fill(column_.begin(), column_.end(), 0.0);
-    column_[row] = 1.0;
-    plain_solver_.solve(std::span{column_}.first(rows));
-    plain.spread[row] = column_[row];
-  }
-  return true;
-}
-
 bool WindowEstimator::stray(const Regression& regression, const Window& window,
                             std::size_t late_first, const Pair& pair, double most_noise,
                             std::span<const Estimate> estimates, std::span<Stray> strays) noexcept {
-  const std::size_t order = regression.order();
-  const std::size_t tones = estimates.size();
-  const auto difference = [&](std::size_t channel) {
-    regression.window(channel, window.first, window.last, cluster_);
-    if (!fit_plain(order, whole_)) return false;
-    regression.window(channel, late_first, window.last, cluster_);
-    return fit_plain(order, late_);
-  };
-  const auto moved = [&](std::size_t tone) {
-    const std::size_t a = 1 + 2 * tone;
-    return std::complex<double>{late_.beta[a + 1] - whole_.beta[a + 1],
-                                late_.beta[a] - whole_.beta[a]};
-  };
-  const auto spread = [&](std::size_t tone) {
-    const std::size_t a = 1 + 2 * tone;
-    return std::max(
-        0.0, late_.spread[a] + late_.spread[a + 1] - whole_.spread[a] - whole_.spread[a + 1]);
-  };
-  std::fill_n(part_input_.begin(), tones, std::complex<double>{});
-  std::fill_n(part_input_noise_.begin(), tones, 0.0);
-  if (!pair.exact_input) {
-    if (!difference(pair.input)) return false;
-    for (std::size_t tone = 0; tone < tones; ++tone) {
-      part_input_[tone] = moved(tone) * input_.turn[tone];
-      // Where the window cannot tell noise from a transient, only what is remembered counts.
-      if (!std::isfinite(most_noise)) part_input_noise_[tone] = late_.variance * spread(tone);
-    }
-  }
-  if (!difference(pair.output)) return false;
-  const double variance = std::min(late_.variance, most_noise * most_noise);
-  for (std::size_t tone = 0; tone < tones; ++tone) {
-    const Estimate& estimate = estimates[tone];
-    const auto shift = moved(tone) * output_.turn[tone] - estimate.response * part_input_[tone];
-    const double noise =
-        variance * spread(tone) + std::norm(estimate.response) * part_input_noise_[tone];
-    strays[tone] = {.shift = std::abs(shift / estimate.output),
-                    .noise = std::sqrt(noise) / std::abs(estimate.output)};
-  }
-  return true;
+  return stray_.estimate(
+      regression, {.first = window.first, .late_first = late_first, .last = window.last}, pair,
+      most_noise, harmonics_, {.input = input_.turn, .output = output_.turn}, estimates, strays);
 }
 
 }  // namespace sinerig

@@ -4,69 +4,16 @@
 #pragma once
 
 #include <complex>
-#include <cstdint>
 #include <span>
 #include <vector>
 
+#include "sweep/estimate.h"
 #include "sweep/nonblocking.h"
 #include "sweep/normal_equations.h"
 #include "sweep/regression.h"
+#include "sweep/stray.h"
 
 namespace sinerig {
-
-// Covariance of (Re H, Im H).
-struct Covariance2 {
-  double re_re = 0.0;
-  double re_im = 0.0;
-  double im_im = 0.0;
-
-  double mean_variance() const noexcept { return 0.5 * (re_re + im_im); }
-  Covariance2 scaled(double factor) const noexcept {
-    return {re_re * factor, re_im * factor, im_im * factor};
-  }
-};
-
-struct Pair {
-  std::size_t input = 0;  // regression channels
-  std::size_t output = 1;
-  bool exact_input = true;  // the input is known, not measured: it carries no noise of its own
-};
-
-// A window of the regression, in checkpoints, and the clusters that it is cut into.
-struct Window {
-  std::size_t first = 0;
-  std::size_t last = 0;
-  std::size_t cluster = 1;  // checkpoints per cluster
-  // Checkpoints per block where the drift is to be taken from the means of the blocks, which
-  // unmodelled harmonics leave alone; 0: from all samples.
-  std::size_t block = 0;
-  bool settled = false;  // for certain: what is loud at its beginning is not a transient
-};
-
-struct Estimate {
-  std::complex<double> response;
-  std::complex<double> input;  // U and Y at their true times, b + j a
-  std::complex<double> output;
-  Covariance2 white;            // of H, were the residual white
-  double output_white = 0.0;    // … mean variance of a component, by the output's residual alone
-  double scatter = 0.0;         // variance of one component of H from the clusters
-  double scatter_white = 0.0;   // what that scatter is to white noise of one in the output
-  double scatter_dof = 0.0;     // 0: too few clusters
-  double rms = 0.0;             // of the output, all tones
-  double residual_rms = 0.0;    // of the output
-  double distortion = 0.0;      // of the output: harmonics beyond the noise, relative to the tone
-  double own_distortion = 0.0;  // … without those that harmonics of the input may explain
-  double drift_per_block = 0.0;
-  double burst = 0.0;    // residual power of the worst cluster over that of the others
-  double lost = 0.0;     // samples of the output that are missing
-  double samples = 0.0;  // of the output that were used
-};
-
-// How far a part of a window strays from the fit of the whole, relative to H.
-struct Stray {
-  double shift = 0.0;  // of H
-  double noise = 0.0;  // rms of that shift if there is nothing but white noise
-};
 
 class WindowEstimator {
  public:
@@ -86,10 +33,8 @@ class WindowEstimator {
   bool is_sinusoidal(const Regression& regression, const Window& window, std::size_t channel,
                      std::size_t tones, std::size_t harmonics) noexcept SINERIG_NONBLOCKING;
 
-  // Of the window last estimated: how far its late part, from checkpoint `late_first` on, strays
-  // from the whole, both fitted without the drift and the harmonics, which in a single cycle would
-  // swallow a ringing transient. The noise is that of the late part, but
-  // `most_noise` at most. False where the tones are not determined.
+  // How far the late part of the window last estimated, from checkpoint `late_first` on, strays
+  // from the whole: see StrayEstimator.
   bool stray(const Regression& regression, const Window& window, std::size_t late_first,
              const Pair& pair, double most_noise, std::span<const Estimate> estimates,
              std::span<Stray> strays) noexcept SINERIG_NONBLOCKING;
@@ -116,15 +61,6 @@ class WindowEstimator {
     double variance(std::size_t order) const noexcept;
   };
 
-  // … and without drift and harmonics.
-  struct Plain {
-    std::vector<double> beta;
-    std::vector<double> spread;  // variance of each coefficient for a noise of one
-    double variance = 0.0;       // of the residual
-
-    explicit Plain(std::size_t rows) : beta(rows), spread(rows) {}
-  };
-
   bool solve(const Regression& regression, const Window& window, std::size_t channel,
              Solution& solution) noexcept;
   void load(const Regression& regression, const Window& window, std::size_t first, std::size_t last,
@@ -137,8 +73,6 @@ class WindowEstimator {
                      std::span<Estimate> estimates) noexcept;
   double white_influence(std::size_t order, std::size_t tone) noexcept;
   double cluster_residual(std::size_t order) noexcept;
-  bool fit_plain(std::size_t order, Plain& plain) noexcept;
-  std::size_t plain_row(std::size_t i) const noexcept;
   void influence(const Solution& solution, std::size_t order, std::vector<double>& moved) noexcept;
 
   Solution input_;
@@ -148,12 +82,7 @@ class WindowEstimator {
   NormalSums cluster_;
   Staircase stairs_;
   std::vector<double> drift_products_;  // of the drift with the instruments
-  NormalSolver plain_solver_;
-  std::vector<double> plain_gram_;
-  Plain whole_;
-  Plain late_;
-  std::vector<std::complex<double>> part_input_;  // per tone
-  std::vector<double> part_input_noise_;          // variance of that
+  StrayEstimator stray_;
   std::vector<double> column_;
   std::vector<double> moved_output_;
   std::vector<double> moved_input_;

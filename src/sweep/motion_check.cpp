@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <numbers>
-#include <string>
 #include <vector>
 
 #include "sweep/multitone.h"
@@ -14,12 +12,6 @@ namespace sinerig {
 namespace {
 
 constexpr double two_pi = 2.0 * std::numbers::pi;
-
-std::string number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.6g", value);
-  return text;
-}
 
 double sine_slew(double amplitude, double frequency_hz, double rate_hz) {
   return 2.0 * amplitude * std::sin(two_pi * frequency_hz / rate_hz / 2.0) * rate_hz;

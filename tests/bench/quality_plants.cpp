@@ -7,6 +7,7 @@
 
 #include "config/rig.h"
 #include "sim/sim_driver.h"
+#include "sweep/asked_frequencies.h"
 
 namespace sinerig::quality {
 

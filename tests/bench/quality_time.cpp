@@ -8,6 +8,7 @@
 #include "quality_fixed.h"
 #include "quality_plants.h"
 #include "support/virtual_run.h"
+#include "sweep/asked_frequencies.h"
 
 namespace sinerig::quality {
 

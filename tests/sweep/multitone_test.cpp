@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "support/exactness.h"
+#include "sweep/asked_frequencies.h"
 #include "sweep/plan.h"
 
 namespace sinerig {

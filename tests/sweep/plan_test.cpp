@@ -6,6 +6,9 @@
 
 #include <gmock/gmock.h>
 
+#include "sweep/asked_frequencies.h"
+#include "sweep/dwell_sizing.h"
+
 namespace sinerig {
 namespace {
 
