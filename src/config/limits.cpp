@@ -60,6 +60,20 @@ std::uint32_t read_count(const Section& section, std::string_view key, std::uint
 
 }  // namespace
 
+MotionLimits read_motion(const Section& limits) {
+  MotionLimits motion;
+  motion.command_min = limits.number("command_min", any_number, motion.command_min);
+  motion.command_max = limits.number("command_max", any_number, motion.command_max);
+  motion.slew_per_s = limits.number("slew_per_s", above_zero_or_unlimited, motion.slew_per_s);
+  motion.velocity_max = limits.number("velocity_max", above_zero_or_unlimited, motion.velocity_max);
+  motion.acceleration_max =
+      limits.number("acceleration_max", above_zero_or_unlimited, motion.acceleration_max);
+  if (!(motion.command_min < motion.command_max)) {
+    limits.refuse("command_min", "must be below command_max");
+  }
+  return motion;
+}
+
 GuardSettings read_guard(const Section& limits, const MotionLimits& motion, double rate_hz) {
   GuardSettings guard;
   guard.command_min = motion.command_min;

@@ -6,10 +6,13 @@
 #include "sweep/guard.h"
 #include "sweep/preflight.h"
 #include "sweep/retry.h"
+#include "sweep/sweep_settings.h"
 
 namespace sinerig::config {
 
-// Each throws ConfigError. The channels are read one by one, after.
+// Each throws ConfigError.
+MotionLimits read_motion(const Section& limits);
+// The channels are read one by one, after.
 GuardSettings read_guard(const Section& limits, const MotionLimits& motion, double rate_hz);
 
 // Of one [sensor.NAME]; `comparable`: it has the unit of the command.
