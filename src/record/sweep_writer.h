@@ -1,39 +1,17 @@
 // Writes NAME.sweep, one SQLite database that holds everything about one run.
 #pragma once
 
-#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "record/database.h"
 #include "record/file_lock.h"
+#include "record/record_rows.h"
 #include "record/spare_room.h"
-#include "sweep/plan.h"
 #include "sweep/records.h"
 
 namespace sinerig::record {
-
-struct ChannelInfo {
-  std::string name;
-  std::string unit;
-};
-
-// What is known before the first tick.
-struct RunInfo {
-  std::string rig_name;
-  std::string rig_text;
-  std::string clock;  // "virtual" or "monotonic"
-  std::vector<ChannelInfo> channels;
-  SweepPlan plan;
-};
-
-// Where a part of a run begins.
-struct PartStart {
-  std::uint32_t dwell = 0;
-  std::uint64_t tick = 0;  // of the file, for the part's own tick 0
-};
 
 class SweepWriter {
  public:
@@ -80,36 +58,19 @@ class SweepWriter {
   void set(const std::string& key, const std::string& value);
 
  private:
-  struct Statements;
-
-  void open(const RunInfo& info);
+  void open();
   void begin();
   void put_on_disk();
   void take_its_place() noexcept;
   void write_head(const RunInfo& info);
-  void write_dwell(std::size_t index, const Dwell& dwell);
-  void insert(const Point& point);
-  void insert(const Block& block);
-  void insert(const DwellTiming& timing);
-  void insert(const Event& event);
-  void insert(const Preflight& preflight);
-  void insert(const Note& note);
-  void insert(const TickSamples& samples);
-  void insert(const Lesson& lesson);
-  std::uint32_t attempt_of(std::uint32_t dwell, std::uint32_t attempt) const;
 
   std::string path_;
-  std::vector<std::string> channel_names_;
-  std::vector<std::string> sensor_names_;
-  std::vector<Dwell> candidates_;   // of the plan's refinement
   bool created_;                    // not resumed
   bool replaces_ = false;           // an earlier file, set aside meanwhile
   std::unique_ptr<FileLock> lock_;  // outlives the database
   std::unique_ptr<SpareRoom> spare_;
   std::unique_ptr<Database> database_;
-  std::unique_ptr<Statements> statements_;
-  PartStart start_;
-  std::map<std::uint32_t, std::uint32_t> attempts_;  // by dwell: those of earlier parts
+  std::unique_ptr<RecordRows> rows_;
   std::vector<Record> pending_;  // since the last commit, but blocks and samples
   bool dwell_half_written_ = false;
 };
