@@ -61,8 +61,10 @@ void DwellRun::begin(const Dwell& dwell, std::uint32_t index, std::uint32_t atte
   scale_ = scale;
   measurement_.start(dwell, by_detection);
   // A change of amplitude that the plan has not foreseen takes longer than its ramp.
-  settle_left_ = dwell.settle_samples + std::max(excitation_.ramp_samples(), dwell.ramp_samples) -
-                 dwell.ramp_samples;
+  const std::uint64_t longer =
+      std::max(excitation_.ramp_samples(), dwell.ramp_samples) - dwell.ramp_samples;
+  settle_left_ = dwell.settle_samples + longer;
+  most_ticks_ = max_dwell_stretch * (dwell.max_samples + longer);
   blocks_ = 0;
   given_up_ = false;
   timing_ = {.dwell = index, .first_tick = tick};
@@ -95,8 +97,8 @@ void DwellRun::measure(std::uint64_t tick, std::span<const Observation> observat
     ++timing_.resettles;
     settle_left_ = std::max(settle_left_, dwell_->settle_samples);
     measurement_.disturb();
-  } else if (settle_left_ > 0) {
-    --settle_left_;
+  } else if (settle_left_ > 0 || !excitation_.on_course()) {
+    settle_left_ -= std::min<std::uint64_t>(settle_left_, 1);
   } else {
     measurement_.add(excitation_.phasors(), observations);
     if (blocks_ < blocks_before_check) commanded_.add(excitation_, measurement_.block_begins());
@@ -105,7 +107,7 @@ void DwellRun::measure(std::uint64_t tick, std::span<const Observation> observat
       if (blocks_ <= blocks_before_check) check_excitation(tick, observations[0].offset_ns);
     }
   }
-  given_up_ = ticks_ >= max_dwell_stretch * dwell_->max_samples;
+  given_up_ = ticks_ >= most_ticks_;
 }
 
 void DwellRun::put_block(std::uint64_t tick, std::size_t channels) noexcept {

@@ -104,6 +104,7 @@ class DwellRun {
   std::uint32_t blocks_ = 0;
   std::uint64_t ticks_ = 0;  // of the grid since the dwell began; 0: it has to begin
   std::uint64_t settle_left_ = 0;
+  std::uint64_t most_ticks_ = 0;  // then it is given up, whatever disturbed it
   bool given_up_ = false;
   DwellTiming timing_;
 };

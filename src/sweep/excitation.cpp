@@ -27,7 +27,8 @@ Excitation::Excitation(std::size_t max_tones, std::size_t max_bins, const Baseli
     : baseline_{baseline},
       oscillation_{baseline.oscillation.cycles, baseline.oscillation.samples},
       voices_(max_tones),
-      phasors_(max_bins) {}
+      phasors_(max_bins),
+      last_{baseline.neutral} {}
 
 // Of the running single tone, one tick on.
 double Excitation::carried_phase_rad() const noexcept {
@@ -47,29 +48,46 @@ std::uint64_t Excitation::fade_samples(std::uint64_t least) const noexcept {
   return distance <= step ? least : std::max(least, ticks(distance / step));
 }
 
-// For a single tone's way to `loudness`: as many ticks as the limit asks for, and half a cycle
-// where the plan of its dwell has foreseen no change.
-std::uint64_t Excitation::change_samples(const Dwell& dwell, double loudness) const noexcept {
-  const double change = std::abs(loudness - loudness_);
-  if (tones_ == 0 || change <= same_loudness * loudness) return 0;
+// The part of its amplitude that the running dwell has reached.
+double Excitation::envelope() const noexcept {
+  if (elapsed_ >= ramp_samples_) return 1.0;
+  const double progress = static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_);
+  return from_scale_ + (1.0 - from_scale_) * progress;
+}
+
+// For a single tone's way to `loudness`: as planned, or as many ticks as the limit asks for, and
+// half a cycle where no change was planned. From rest it needs no ramp, as it begins where it
+// crosses zero: where a short one is steeper than the limit, there is none.
+std::uint64_t Excitation::ramp_to(const Dwell& dwell, double loudness) const noexcept {
+  const bool from_rest = tones_ == 0;
+  const double change = from_rest ? loudness : std::abs(loudness - envelope() * loudness_);
+  if (change <= same_loudness * loudness) return dwell.ramp_samples;
+  if (from_rest && dwell.ramp_samples == 0) return 0;
   const double cycle_samples =
       static_cast<double>(dwell.block_samples) / static_cast<double>(dwell.tones.front().cycles);
   const double step = std::max(loudness, loudness_) * two_pi / cycle_samples;
   const double allowed = baseline_.free_step();
   const double free = std::max(allowed - step, least_free_part * allowed);
   const double least = dwell.ramp_samples == 0 ? 0.5 * cycle_samples : 0.0;
-  return ticks(std::max(least, change / free));
+  const std::uint64_t needed = ticks(std::max(least, change / free));
+  if (needed <= dwell.ramp_samples) return dwell.ramp_samples;
+  const bool steep = static_cast<double>(dwell.ramp_samples) < 0.5 * cycle_samples;
+  return from_rest && steep ? 0 : needed;
 }
 
 void Excitation::start(const Dwell& dwell, double scale) noexcept {
   const double last = tones();
-  const bool several = tones_ > 1 || dwell.tones.size() > 1;
+  const bool crossing = tones_ > 1 || dwell.tones.size() > 1 || (tones_ == 0 && last != 0.0);
   const double carried = tones_ == 1 && dwell.tones.size() == 1 ? carried_phase_rad() : 0.0;
   double loudness = 0.0;
   for (const Tone& tone : dwell.tones) loudness = std::max(loudness, scale * tone.amplitude);
-  ramp_samples_ = dwell.ramp_samples;
-  if (!several) ramp_samples_ = std::max(ramp_samples_, change_samples(dwell, loudness));
-  const double loudness_before = loudness_;
+  const double loudness_before = envelope() * loudness_;
+  if (crossing) {
+    ramp_samples_ = tones_ == 0 ? fade_samples(dwell.ramp_samples) : dwell.ramp_samples;
+  } else {
+    ramp_samples_ = ramp_to(dwell, loudness);
+  }
+  resting_ = false;
   tones_ = dwell.tones.size();
   bins_ = dwell.bins();
   elapsed_ = 0;
@@ -88,7 +106,7 @@ void Excitation::start(const Dwell& dwell, double scale) noexcept {
                   static_cast<double>(dwell.block_samples);
   }
   refresh();
-  if (several) {
+  if (crossing) {
     from_scale_ = 0.0;
     handover_ = last;
   } else {
@@ -105,19 +123,28 @@ void Excitation::rest() noexcept {
   oscillation_ = PhaseCounter{baseline_.oscillation.cycles, baseline_.oscillation.samples};
   handover_ = 0.0;
   waveform_ = {};
+  last_ = baseline_.neutral;
+  lagging_ = false;
+  resting_ = true;
+  refresh();
 }
 
-void Excitation::start(std::span<const double> waveform, std::uint64_t ramp_samples,
-                       double scale) noexcept {
-  ramp_samples_ = fade_samples(ramp_samples);
-  handover_ = tones();
-  waveform_ = waveform;
+void Excitation::start(const Probe& probe, double scale) noexcept {
+  fade(0);
+  waveform_ = probe.command;
   waveform_scale_ = scale;
+  tone_step_ = scale * probe.max_step;
+}
+
+void Excitation::fade(std::uint64_t least) noexcept {
+  ramp_samples_ = fade_samples(least);
+  handover_ = tones();
+  waveform_ = {};
   tones_ = 0;
   bins_ = 0;
   elapsed_ = 0;
   loudness_ = 0.0;
-  tone_step_ = 0.0;
+  resting_ = false;
 }
 
 void Excitation::advance(std::uint64_t ticks) noexcept {
@@ -156,10 +183,9 @@ double Excitation::tones() const noexcept {
   const double progress =
       ramping ? static_cast<double>(elapsed_) / static_cast<double>(ramp_samples_) : 1.0;
   const double fading = ramping ? handover_ * (1.0 - progress) : 0.0;
-  if (tones_ == 0) {
-    return fading + (elapsed_ < waveform_.size() ? waveform_scale_ * waveform_[elapsed_] : 0.0);
-  }
-  return tones_at_full() * (from_scale_ + (1.0 - from_scale_) * progress) + fading;
+  if (tones_ > 0) return tones_at_full() * envelope() + fading;
+  if (ramping || elapsed_ - ramp_samples_ >= waveform_.size()) return fading;
+  return waveform_scale_ * waveform_[elapsed_ - ramp_samples_];
 }
 
 double Excitation::baseline() const noexcept {
@@ -171,19 +197,32 @@ double Excitation::baseline() const noexcept {
 }
 
 double Excitation::command() const noexcept {
+  if (resting_) return baseline_.neutral;
   if (!closing_) return baseline() + tones();
   if (elapsed_ >= closing_samples_) return baseline_.neutral;
   const double left = 1.0 - static_cast<double>(elapsed_) / static_cast<double>(closing_samples_);
   return baseline_.neutral + (closing_from_ - baseline_.neutral) * left;
 }
 
+double Excitation::move(std::uint64_t ticks) noexcept {
+  const double wanted = command();
+  const double step = wanted - last_;
+  const double most = baseline_.max_step * static_cast<double>(ticks);
+  lagging_ = !on_course() && std::abs(step) > most;
+  last_ = lagging_ ? last_ + std::copysign(most, step) : wanted;
+  return last_;
+}
+
 void Excitation::close() noexcept {
   closing_from_ = command();
   const double distance = std::abs(closing_from_ - baseline_.neutral);
   closing_samples_ = fade_samples(baseline_.ramp_samples);
-  if (distance > baseline_.max_step) {
-    closing_samples_ = std::max(closing_samples_, ticks(distance / baseline_.max_step));
-  }
+  const auto no_faster_than = [&](double step) {
+    if (distance > step) closing_samples_ = std::max(closing_samples_, ticks(distance / step));
+  };
+  no_faster_than(baseline_.max_step);
+  if (baseline_.oscillates()) no_faster_than(tone_step_ + baseline_.step());
+  resting_ = false;
   elapsed_ = 0;
   closing_ = true;
 }

@@ -21,33 +21,46 @@ class Excitation {
   // Begins a dwell. The command has no step and, on the way, is nowhere beyond the larger of both
   // dwells: a single tone goes on from the phase that the single tone before has reached (after
   // whole cycles that is zero), its envelope moves up over the ramp to `scale` times the planned
-  // amplitude, and what a louder one before stood above it fades out; several tones are faded in
-  // while what was there fades out.
+  // amplitude, and what a louder one before stood above it fades out; several tones, or one after a
+  // waveform, are faded in while what was there fades out.
   void start(const Dwell& dwell, double scale) noexcept SINERIG_NONBLOCKING;
 
-  // Of the dwell or the waveform that has begun: the planned ramp, or what a change of amplitude
-  // takes that no plan has foreseen (after a pre-flight, a soft limit).
+  // Of the dwell that has begun: the planned ramp, or what a change of amplitude takes that no plan
+  // has foreseen (after a pre-flight, a soft limit, an interruption).
   std::uint64_t ramp_samples() const noexcept { return ramp_samples_; }
 
-  // The command has been taken to neutral: the next dwell begins from there.
+  // The command has been taken to neutral: what is next begins from there.
   void rest() noexcept SINERIG_NONBLOCKING;
 
-  // Begins a waveform laid on the baseline, `scale` times one value per tick, zero beyond its end.
-  // Over the ramp, which is as long as that takes, the tones before fade out.
-  void start(std::span<const double> waveform, std::uint64_t ramp_samples,
-             double scale = 1.0) noexcept SINERIG_NONBLOCKING;
+  // What is played fades out, then the probe's waveform follows on the baseline, `scale` times one
+  // value per tick, zero beyond its end.
+  void start(const Probe& probe, double scale) noexcept SINERIG_NONBLOCKING;
+
+  // What is played fades out, no faster than it has moved, over `least` ticks at least.
+  void fade(std::uint64_t least) noexcept SINERIG_NONBLOCKING;
+  bool fading() const noexcept { return tones_ == 0 && elapsed_ < ramp_samples_; }
 
   // Moves on by `ticks`.
   void advance(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
 
+  // Where the command would be in this tick …
   double command() const noexcept SINERIG_NONBLOCKING;
+
+  // … and where it goes, `ticks` after it was last moved: there, but on the way from one thing to
+  // the next no faster than its limit allows.
+  double move(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
+
+  // The dwell's tones are what is played: the ramp is over, and nothing is left to be caught up.
+  bool on_course() const noexcept {
+    return !closing_ && tones_ > 0 && elapsed_ >= ramp_samples_ && !lagging_;
+  }
   // What of it is no tone.
   double baseline() const noexcept SINERIG_NONBLOCKING;
 
   // The end of the sweep: from here on the command goes from where it is to neutral, no faster than
   // the tones have moved it and than its limit allows.
   void close() noexcept SINERIG_NONBLOCKING;
-  bool closed() const noexcept { return closing_ && elapsed_ >= closing_samples_; }
+  bool closed() const noexcept { return closing_ && elapsed_ >= closing_samples_ && !lagging_; }
 
   // The commanded tone as b + j a, on the phasors of the same bin.
   std::complex<double> commanded(std::size_t tone) const noexcept {
@@ -70,7 +83,8 @@ class Excitation {
   double tones() const noexcept;
   double tones_at_full() const noexcept;
   std::uint64_t fade_samples(std::uint64_t least) const noexcept;
-  std::uint64_t change_samples(const Dwell& dwell, double loudness) const noexcept;
+  double envelope() const noexcept;
+  std::uint64_t ramp_to(const Dwell& dwell, double loudness) const noexcept;
   void refresh() noexcept;
 
   Baseline baseline_;
@@ -84,11 +98,14 @@ class Excitation {
   std::uint64_t elapsed_ = 0;
   std::uint64_t ramp_samples_ = 0;
   double loudness_ = 0.0;    // largest amplitude of the running dwell
-  double tone_step_ = 0.0;   // the tones' largest change per tick
+  double tone_step_ = 0.0;   // the largest change per tick of the tones, or of the waveform
   double handover_ = 0.0;    // what fades out over the ramp
   double from_scale_ = 1.0;  // where the envelope begins, of the running dwell's amplitudes
   std::span<const double> waveform_;
   double waveform_scale_ = 1.0;
+  double last_ = 0.0;     // where the command was moved to
+  bool lagging_ = false;  // … which is not where it would be
+  bool resting_ = true;
   bool closing_ = false;
   std::uint64_t closing_samples_ = 0;
   double closing_from_ = 0.0;

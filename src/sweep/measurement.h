@@ -129,7 +129,7 @@ class Measurement {
   bool evaluate(std::size_t pair, const Window& window) noexcept;
   bool still(const Window& window) noexcept;
   void look_for_transient(std::size_t pair, const Window& window) noexcept;
-  bool target_met(std::size_t pair) const noexcept;
+  bool target_met(std::size_t pair, bool as_it_is = false) const noexcept;
   double settling_tolerance() const noexcept;
   std::size_t parts_per_block() const noexcept;
   Result& result(std::size_t pair, std::size_t tone) noexcept {

@@ -92,7 +92,8 @@ bool Measurement::evaluate(std::size_t pair, const Window& window) noexcept {
     each.no_input = !solved && estimator_.input_silent();
     if (!solved) continue;
     each.estimate = estimates_[tone];
-    each.variance = memories_[pair].pooled(each.estimate, omega_[tone] / (2.0 * std::numbers::pi));
+    each.variance = memories_[pair].pooled(each.estimate, omega_[tone] / (2.0 * std::numbers::pi),
+                                           pairs_[pair].exact_input);
   }
   return solved;
 }
@@ -127,7 +128,8 @@ void Measurement::look_for_transient(std::size_t pair, const Window& window) noe
     const double white = whole.estimate.white.mean_variance();
     const double dof = whole.variance.dof;
     const double seen = white > 0.0 ? whole.variance.covariance.mean_variance() / white : 1.0;
-    const double colour = (dof * seen + colour_dof) / (dof + colour_dof);
+    const double leaned_to = pairs_[pair].exact_input ? 1.0 : std::min(1.0, seen);
+    const double colour = (dof * seen + colour_dof * leaned_to) / (dof + colour_dof);
     whole.late = strays_[tone];
     whole.late.noise *= std::sqrt(colour);
     TransientBound bound;
@@ -158,12 +160,14 @@ bool Measurement::still(const Window& window) noexcept {
   return all;
 }
 
-bool Measurement::target_met(std::size_t pair) const noexcept {
+// Whether the dwell may end here: by the variance that was expected before the window was seen,
+// where that is more. At its end `as_it_is`: what the point says of itself.
+bool Measurement::target_met(std::size_t pair, bool as_it_is) const noexcept {
   if (!judgement_.has_target() || (pair > 0 && judgement_.target_of_first)) return true;
   for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
     const Result& each = result(pair, tone);
     if (each.variance.dof == 0.0) return false;
-    const Interval half = interval(each, std::max(1.0, each.variance.expected));
+    const Interval half = interval(each, as_it_is ? 1.0 : std::max(1.0, each.variance.expected));
     if (judgement_.target_db > 0.0 && !(half.gain_db <= judgement_.target_db)) return false;
     if (judgement_.target_deg > 0.0 && !(half.phase_deg <= judgement_.target_deg)) return false;
   }

@@ -84,9 +84,9 @@ Point Measurement::point(std::size_t pair, std::size_t tone) const noexcept {
     mark(PointStatus::low_signal, PointReason::noise_burst, estimate.burst);
   } else if (estimate.own_distortion > judgement_.max_distortion) {
     mark(PointStatus::distorted, PointReason::harmonics, estimate.own_distortion);
-  } else if (by_model_ && at_limit_ && !target_met(pair)) {
+  } else if (by_model_ && at_limit_ && !modal_->accepted()) {
     mark(PointStatus::unsettled, PointReason::model_at_limit, half.gain_db);
-  } else if (!target_met(pair)) {
+  } else if (!target_met(pair, true)) {
     mark(PointStatus::low_signal, PointReason::target_not_reached, half.gain_db);
   } else if (!(gain > 0.0)) {
     mark(PointStatus::low_signal, PointReason::no_response, 0.0);

@@ -155,7 +155,7 @@ bool ModalSettling::fill_result(const ModalStore& store, std::size_t output) noe
     estimate.scatter_white = white;
   }
   result.variance =
-      memories_[output].pooled(estimate, task_.omega_rad_s / (2.0 * std::numbers::pi));
+      memories_[output].pooled(estimate, task_.omega_rad_s / (2.0 * std::numbers::pi), true);
   if (result.variance.dof == 0.0) {
     result.variance = {.covariance = estimate.white,
                        .dof = std::min(noise_[output].dof, most_pooled_dof)};

@@ -19,12 +19,16 @@ constexpr double max_memory_dof = 200.0;
 // 81–90 %.
 constexpr double white_dof = 20.0;
 
+// The scatter may be this much more than what was seen of it, where it was seen often enough.
+constexpr double most_chance = 2.0;
+
 // Standard errors between what the window shows and what the memory says before it is set aside.
 constexpr double disagreement = 3.0;
 
 }  // namespace
 
-PooledVariance NoiseMemory::pooled(const Estimate& estimate, double frequency_hz) const noexcept {
+PooledVariance NoiseMemory::pooled(const Estimate& estimate, double frequency_hz,
+                                   bool exact_input) const noexcept {
   const double white = estimate.white.mean_variance();
   if (!(white > 0.0)) return {.covariance = {}, .dof = estimate.scatter_dof};
   const double log_frequency = std::log(frequency_hz);
@@ -46,7 +50,13 @@ PooledVariance NoiseMemory::pooled(const Estimate& estimate, double frequency_hz
   const double dof = estimate.scatter_dof + memory_dof;
   if (dof == 0.0) return {.covariance = estimate.white, .dof = 0.0};
   const double colour = (estimate.scatter_dof * seen + memory_dof * remembered) / dof;
-  const double expected = (memory_dof * remembered + white_dof) / (memory_dof + white_dof);
+  double leaned_to = 1.0;
+  if (!exact_input && memory_dof > 0.0)
+    leaned_to = std::min(1.0, most_chance * remembered);
+  else if (!exact_input && estimate.scatter_dof >= white_dof)
+    leaned_to = std::min(1.0, most_chance * seen);
+  const double expected =
+      (memory_dof * remembered + white_dof * leaned_to) / (memory_dof + white_dof);
   return {.covariance = estimate.white.scaled(colour), .dof = dof, .expected = expected / colour};
 }
 

@@ -22,8 +22,10 @@ struct PooledVariance {
 class NoiseMemory {
  public:
   // The variance of H at this frequency, from the clusters of the window and the memory together.
-  PooledVariance pooled(const Estimate& estimate,
-                        double frequency_hz) const noexcept SINERIG_NONBLOCKING;
+  // With an `exact_input` less scatter than a white residual gives is not expected; what moves two
+  // measured signals alike is no scatter of their ratio, however loud.
+  PooledVariance pooled(const Estimate& estimate, double frequency_hz,
+                        bool exact_input) const noexcept SINERIG_NONBLOCKING;
 
   // Takes in a finished dwell.
   void learn(const Estimate& estimate, double frequency_hz) noexcept SINERIG_NONBLOCKING;

@@ -99,6 +99,7 @@ struct Probe {
   std::uint64_t quiet_samples = 0;  // of them at rest before the waveform begins
   double low_hz = 0.0;
   double high_hz = 0.0;
+  double max_step = 0.0;  // of the command per tick
 };
 
 struct SweepPlan {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <numbers>
 
@@ -33,13 +32,17 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   const std::vector<double> asked = asked_frequencies(sweep);
   const auto [low, high] = std::minmax_element(asked.begin(), asked.end());
   Probe probe{.command = {}, .quiet_samples = 0, .low_hz = *low, .high_hz = *high};
-  const double wanted =
-      sweep.probe_s > 0.0 ? sweep.probe_s * rate_hz : cycles_of_lowest / probe.low_hz * rate_hz;
+  const double ratio = std::max(probe.high_hz / probe.low_hz, 2.0);
+  const double octaves = std::log(ratio);
+  // Of the lowest frequency, so that the chirp goes once through a cycle.
+  const double once = 1.02 * octaves / ((ratio - 1.0) * (1.0 - quiet_part));
+  const double wanted = sweep.probe_s > 0.0
+                            ? sweep.probe_s * rate_hz
+                            : std::max(cycles_of_lowest, once) / probe.low_hz * rate_hz;
   if (sweep.probe_s > 0.0 && wanted > most_ticks) {
-    char rule[96];
-    std::snprintf(rule, sizeof rule, "%.6g: at this rate the probe lasts %.6g s at most",
-                  sweep.probe_s, most_ticks / rate_hz);
-    throw PlanRefused("sweep", "probe_s", rule);
+    throw PlanRefused("sweep", "probe_s",
+                      number(sweep.probe_s) + ": at this rate the probe lasts " +
+                          number(most_ticks / rate_hz) + " s at most");
   }
   const double ticks = std::clamp(wanted, least_ticks, most_ticks);
   const auto quiet = static_cast<std::size_t>(quiet_part * ticks);
@@ -50,11 +53,11 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   const double bias_velocity = sweep.bias_amplitude * bias_rad_s;
   const double velocity_left = limits.velocity_max - bias_velocity;
   const double acceleration_left = limits.acceleration_max - bias_velocity * bias_rad_s;
-  const double octaves = std::log(std::max(probe.high_hz / probe.low_hz, 2.0));
   double phase = 0.0;
   double slew = 0.0;
   double peak = 0.0;
   std::size_t end = quiet;
+  bool whole = false;  // it has come to the end of a cycle
   for (std::size_t k = quiet; k < length; ++k) {
     const double part = static_cast<double>(k - quiet) / static_cast<double>(length - quiet);
     const double hz = std::min(probe.low_hz * std::exp(octaves * part), 0.45 * rate_hz);
@@ -66,9 +69,19 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
     if (k == 0) continue;
     slew = std::max(slew, std::abs(probe.command[k] - probe.command[k - 1]) * rate_hz);
     peak = std::max(peak, std::abs(probe.command[k]));
-    if (probe.command[k] >= 0.0 && probe.command[k - 1] < 0.0) end = k;
+    const bool rises = probe.command[k] >= 0.0 && probe.command[k - 1] < 0.0;
+    const bool falls = probe.command[k] <= 0.0 && probe.command[k - 1] > 0.0;
+    if (rises || (falls && !whole)) end = k;
+    whole = whole || rises;
   }
-  // The last half cycle would end in a step.
+  if (end == quiet) {
+    throw PlanRefused("sweep", "probe_s",
+                      "not even half a cycle of " + number(probe.low_hz) +
+                          " Hz fits into a probe of " +
+                          number(static_cast<double>(length) / rate_hz) +
+                          " s: lengthen it, or set settling = \"detect\"");
+  }
+  // What is left of a cycle would end in a step.
   std::fill(probe.command.begin() + static_cast<std::ptrdiff_t>(end), probe.command.end(), 0.0);
   const double baseline = sweep.neutral + sweep.offset;
   const double room =
@@ -79,6 +92,7 @@ Probe make_probe(const SweepSettings& sweep, const MotionLimits& limits, double 
   const double scale =
       std::max(0.0, std::min({1.0, room / peak, free_slew / slew, loudest / peak}));
   for (double& each : probe.command) each *= scale;
+  probe.max_step = scale * slew / rate_hz;
   return probe;
 }
 
@@ -123,9 +137,23 @@ void Prober::search() noexcept {
   known_ = finder_->find(record_, found_);
 }
 
+void Prober::skip() noexcept {
+  if (stage_ == Stage::searching) {
+    forgotten_ = true;
+    return;
+  }
+  stage_ = Stage::done;
+}
+
+void Prober::hear() noexcept {
+  if (!deputy_.idle()) return;
+  stage_ = Stage::done;
+  if (std::exchange(forgotten_, false)) known_ = false;
+}
+
 void Prober::add(std::span<const Observation> observations, bool disturbed) noexcept {
   if (stage_ == Stage::searching) {
-    if (deputy_.idle()) stage_ = Stage::done;
+    hear();
     return;
   }
   if (disturbed) {
@@ -143,7 +171,7 @@ void Prober::add(std::span<const Observation> observations, bool disturbed) noex
   if (++count_ < applied_.size()) return;
   stage_ = Stage::searching;
   deputy_.ask();
-  if (deputy_.idle()) stage_ = Stage::done;
+  hear();
 }
 
 }  // namespace sinerig

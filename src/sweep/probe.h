@@ -39,21 +39,23 @@ class Prober {
   // The waveform begins with this tick.
   bool begins() noexcept { return std::exchange(begins_, false); }
 
-  // Nothing has to be found.
-  void skip() noexcept { stage_ = Stage::done; }
+  // Nothing has to be found: what is being looked for is waited for, and forgotten.
+  void skip() noexcept SINERIG_NONBLOCKING;
 
-  // The modes have to be found once more.
   // The command has been at rest in between: plays from the beginning, where it still plays.
   void restart() noexcept SINERIG_NONBLOCKING;
+
+  // The modes have to be found once more.
   void again() noexcept SINERIG_NONBLOCKING;
 
-  // After it has run: nothing where it had nothing to do, or nothing was found.
+  // After it has run, not while it runs: nothing where it had nothing to do, or nothing was found.
   const KnownModes* found() const noexcept { return known_ ? &found_ : nullptr; }
 
  private:
   enum class Stage { playing, searching, done };
 
   void search() noexcept;
+  void hear() noexcept;
 
   const Probe& probe_;
   double period_s_;
@@ -68,6 +70,7 @@ class Prober {
   ProbeRecord record_;
   KnownModes found_;
   bool known_ = false;
+  bool forgotten_ = false;  // what is being looked for
   Deputy deputy_;
 };
 

@@ -119,8 +119,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool new_dwell = !closing && !between_dwells && !run_.begun();
   if (new_dwell) begin_dwell(tick.index + 1 - ticks);
   const bool probe_begins = probing && prober_.begins();
-  if (probe_begins)
-    excitation_.start(plan_.probe.command, plan_.probe.quiet_samples / 2, probe_scale_);
+  if (probe_begins) excitation_.start(plan_.probe, probe_scale_);
   excitation_.advance(new_dwell || probe_begins ? ticks - 1 : ticks);
   if (!between_dwells) run_.pass(tick, ticks);
   ++outcome_.ticks;
@@ -135,7 +134,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
     guard_.trip(TripCause::clock_lost, no_sensor, gap_s, settings_.max_gap_s, tick.index);
   }
   guard_.observe_lateness(tick.lateness.count(), tick.index);
-  command_ = guard_.admit(excitation_.command(), tick.index, ticks);
+  command_ = guard_.admit(excitation_.move(ticks), tick.index, ticks);
   exchange(command_, tick);
   control.tick.store(tick.index, std::memory_order_relaxed);
   control.dwell.store(dwell_, std::memory_order_relaxed);
@@ -149,10 +148,9 @@ bool SweepRunner::step(RunControl& control) noexcept {
   const bool late = lateness_s > settings_.max_lateness * clock_.grid().period_s();
   const bool disturbed = ticks > 1 || late || command_lost_ || command_late_;
   if (probing) {
-    probe(disturbed);
+    if (!excitation_.fading()) probe(disturbed);
   } else if (reviewing) {
-    review_ramp_left_ -= std::min(review_ramp_left_, ticks);
-    if (review_ramp_left_ == 0 && review_.ready()) hear_review();
+    if (!excitation_.fading() && review_.ready()) hear_review();
   } else {
     run_.measure(tick.index, observations_, disturbed);
     if (run_.over()) conclude_dwell();

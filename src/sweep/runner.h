@@ -117,7 +117,6 @@ class SweepRunner {
   ModelTrust trust_;
   SweepReview review_;
   int reviews_ = 0;
-  std::uint64_t review_ramp_left_ = 0;     // ticks until the command is at rest
   bool remeasuring_ = false;               // what was modelled with modes that turned out wrong
   std::vector<Observation> observations_;  // applied, sensors: this tick
   double command_ = 0.0;                   // this tick

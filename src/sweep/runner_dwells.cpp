@@ -88,7 +88,7 @@ bool SweepRunner::probe_lower() noexcept {
   }
   if (recovery_.soft_all_spent()) return false;
   prober_.skip();
-  judge_model();
+  if (!prober_.running()) judge_model();
   return true;
 }
 

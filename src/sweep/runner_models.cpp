@@ -85,8 +85,7 @@ void SweepRunner::review() noexcept {
     return;
   }
   // Nothing moves while the answer is waited for.
-  excitation_.start(std::span<const double>{}, plan_.baseline.ramp_samples);
-  review_ramp_left_ = excitation_.ramp_samples();
+  excitation_.fade(plan_.baseline.ramp_samples);
 }
 
 void SweepRunner::hear_review() noexcept {
