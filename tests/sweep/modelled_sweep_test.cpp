@@ -217,11 +217,14 @@ TEST(ModelledSweep, SaysWhichDwellsEndedAtTheirLimit) {
   sweep.integrate_max = {.cycles = 2.0, .seconds = 0.5};
   sim::SimulatedRigSettings rig = damped_axis();
   rig.sensors[0].imperfections.noise_rms = 1e-2;
+  rig.sensors.push_back(rig.sensors[0]);
+  sweep.target_of_first = true;  // of the other nothing is asked, but that its model holds
   RunnerSettings settings = told();
-  settings.modes->noise_variance = {1e-4};
+  settings.modes->noise_variance = {1e-4, 1e-4};
   const test::VirtualRun run =
-      test::run_virtual(plan_sweep(sweep, {}, rate_hz), rig, test::open_guard(1), settings);
-  ASSERT_EQ(run.sink.points.size(), 1U);
+      test::run_virtual(plan_sweep(sweep, {}, rate_hz), rig, test::open_guard(2), settings);
+  ASSERT_EQ(run.sink.points.size(), 2U);
+  EXPECT_EQ(run.sink.points[1].reason, PointReason::model_at_limit);
   const Point& point = run.sink.points[0];
   EXPECT_EQ(point.settled_by, SettledBy::model);
   EXPECT_EQ(point.status, PointStatus::unsettled);
