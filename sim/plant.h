@@ -53,7 +53,7 @@ class Plant {
   void sample(PlantTime time, std::span<double> outputs) noexcept;
 
   std::size_t outputs() const noexcept { return outputs_; }
-  double input() const noexcept { return input_; }  // at the time of the last sample
+  PlantTime time() const noexcept { return now_; }  // of the last sample
 
  private:
   struct Edge {
