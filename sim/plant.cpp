@@ -83,6 +83,14 @@ void Plant::apply(double value, PlantTime time) noexcept {
   ++edge_count_;
 }
 
+void Plant::make_room() {
+  if (edge_count_ < edges_.size()) return;
+  std::rotate(edges_.begin(), edges_.begin() + static_cast<std::ptrdiff_t>(first_edge_),
+              edges_.end());
+  first_edge_ = 0;
+  edges_.resize(2 * edges_.size());
+}
+
 void Plant::sample(PlantTime time, std::span<double> outputs) noexcept {
   while (edge_count_ > 0 && edges_[first_edge_].time - time <= 0.0) {
     const Edge& edge = edges_[first_edge_];

@@ -46,8 +46,13 @@ class Plant {
   // Throws std::invalid_argument where friction is asked of a plant without a velocity.
   Plant(const LinearSystem& system, double period_s, Friction friction = {});
 
-  // The input becomes `value` at `time` (plus the dead time); times must not go back.
+  // The input becomes `value` at `time` (plus the dead time); times must not go back. Room is for
+  // the commands of the dead time at one per tick, and some.
   void apply(double value, PlantTime time) noexcept;
+
+  // Room for one more input under way. Allocates: for whoever is commanded faster than once a tick,
+  // outside the loop.
+  void make_room();
 
   // Carries the state to `time`, which must not go back, and writes every output.
   void sample(PlantTime time, std::span<double> outputs) noexcept;
