@@ -35,6 +35,7 @@ void balance(LinearSystem& system) {
       system.a.col(i) *= factor;
       system.a.row(i) /= factor;
       system.b(i) /= factor;
+      if (system.force.size() > 0) system.force(i) /= factor;
       system.c.col(i) *= factor;
       if (system.velocity.size() > 0) system.velocity(i) *= factor;
       changed = true;
@@ -72,10 +73,11 @@ LinearSystem series(const LinearSystem& first, const LinearSystem& second) {
   chain.c << second.d * first.c.row(0), second.c;
   chain.d = second.d * first.d(0);
   chain.outputs = second.outputs;
-  chain.input_gain = first.input_gain;
   if (second.velocity.size() > 0) {
     chain.velocity = Eigen::RowVectorXd::Zero(n1 + n2);
     chain.velocity.tail(n2) = second.velocity;
+    chain.force = VectorXd::Zero(n1 + n2);
+    chain.force.tail(n2) = second.force;
   }
   return chain;
 }
@@ -199,15 +201,16 @@ LinearSystem from_mechanical_axis(const MechanicalAxis& axis) {
   LinearSystem system;
   system.a = MatrixXd::Zero(n, n);
   system.b = VectorXd::Zero(n);
+  system.force = VectorXd::Zero(n);
   system.c = MatrixXd::Zero(2, n);
   system.d = VectorXd::Zero(2);
   system.outputs = {"position", "velocity"};
-  system.input_gain = axis.gain;
 
   system.a(0, 1) = 1.0;
   system.a(1, 0) = -axis.stiffness / axis.inertia;
   system.a(1, 1) = -axis.damping / axis.inertia;
   system.b(1) = axis.gain / axis.inertia;
+  system.force(1) = 1.0 / axis.inertia;
   system.c(0, 0) = 1.0;
   system.c(1, 1) = 1.0;
   Index row = 2;
@@ -217,6 +220,7 @@ LinearSystem from_mechanical_axis(const MechanicalAxis& axis) {
     system.a(row + 1, row) = -omega;
     system.a(row + 1, row + 1) = -2.0 * mode.damping * omega;
     system.b(row + 1) = axis.gain * mode.residue / omega;
+    system.force(row + 1) = mode.residue / omega;
     system.c(0, row) = 1.0;
     system.c(1, row + 1) = omega;
     row += 2;
@@ -224,9 +228,7 @@ LinearSystem from_mechanical_axis(const MechanicalAxis& axis) {
   system.velocity = system.c.row(1);
   if (axis.lag_hz > 0.0) {
     const double corner = 2.0 * std::numbers::pi * axis.lag_hz;
-    LinearSystem lag = from_transfer_function({corner}, {1.0, corner});
-    lag.input_gain = axis.gain;
-    system = series(lag, system);
+    system = series(from_transfer_function({corner}, {1.0, corner}), system);
   }
   balance(system);
   return system;

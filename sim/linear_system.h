@@ -18,7 +18,7 @@ struct LinearSystem {
   std::vector<std::string> outputs;  // a name per row of C
   double dead_time_s = 0.0;
   Eigen::RowVectorXd velocity;  // the velocity that friction acts on; empty where there is none
-  double input_gain = 1.0;      // force per unit of u, to bring friction to the input
+  Eigen::VectorXd force;        // x' of a unit force at that velocity, in the place of b
 
   Eigen::Index states() const { return a.rows(); }
 };

@@ -38,8 +38,11 @@ PlantTime Motor::plant_time(std::int64_t time_ns) {
           .fraction = static_cast<double>(within_ns) / static_cast<double>(plant_period_ns)};
 }
 
+// Whether or not anybody looks between the set-points: what is due leaves the plant's queue here.
 void Motor::apply(double torque, std::int64_t time_ns) {
   torque_ = torque;
+  sample(time_ns);
+  plant_.make_room();
   plant_.apply(torque, plant_time(time_ns));
 }
 

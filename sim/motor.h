@@ -9,7 +9,9 @@
 
 namespace sinerig::sim {
 
-// Torque in at a time, angle and rate out at a time. Times are CLOCK_MONOTONIC.
+// Torque in at a time, angle and rate out at a time. Times are CLOCK_MONOTONIC. However fast
+// torques come and however seldom the shaft is looked at, each acts for its own time, after the
+// dead time.
 class Motor {
  public:
   // Throws std::invalid_argument for a system without the outputs position and velocity.

@@ -49,10 +49,10 @@ Plant::Plant(const LinearSystem& system, double period_s, Friction friction)
       dead_ticks_{system.dead_time_s / period_s},
       a_{row_major(system.a * period_s)},
       b_{row_major(system.b * period_s)},
+      force_{row_major(system.force * period_s)},
       c_{row_major(system.c)},
       d_{row_major(system.d)},
       velocity_{row_major(system.velocity)},
-      input_gain_{system.input_gain},
       friction_{friction},
       norm_{n_ == 0 ? 0.0 : (system.a * period_s).cwiseAbs().rowwise().sum().maxCoeff()},
       rows_{(n_ + rows_at_a_time - 1) / rows_at_a_time * rows_at_a_time},
@@ -60,11 +60,13 @@ Plant::Plant(const LinearSystem& system, double period_s, Friction friction)
       scratch_(rows_),
       term_(n_),
       product_(n_),
-      before_(rows_),
+      pushed_(rows_),
       edges_(static_cast<std::size_t>(std::ceil(dead_ticks_)) + spare_edges),
-      known_(max_known_transitions, {.ticks = 0.0,
-                                     .phi = std::vector<double>(n_ * rows_),
-                                     .gamma = std::vector<double>(rows_)}) {
+      known_(max_known_transitions,
+             {.ticks = 0.0,
+              .phi = std::vector<double>(n_ * rows_),
+              .gamma = std::vector<double>(rows_),
+              .force = std::vector<double>(friction.present() ? rows_ : 0)}) {
   // Dead times that are whole ticks but for the rounding of the division are whole ticks.
   if (std::abs(dead_ticks_ - std::round(dead_ticks_)) < 1e-9) dead_ticks_ = std::round(dead_ticks_);
   if (friction_.present() && velocity_.empty()) {
@@ -81,6 +83,14 @@ void Plant::apply(double value, PlantTime time) noexcept {
   }
   edges_[wrapped(first_edge_ + edge_count_)] = {.time = due, .value = value};
   ++edge_count_;
+}
+
+void Plant::make_room() {
+  if (edge_count_ < edges_.size()) return;
+  std::rotate(edges_.begin(), edges_.begin() + static_cast<std::ptrdiff_t>(first_edge_),
+              edges_.end());
+  first_edge_ = 0;
+  edges_.resize(2 * edges_.size());
 }
 
 void Plant::sample(PlantTime time, std::span<double> outputs) noexcept {
@@ -106,7 +116,7 @@ void Plant::sample(PlantTime time, std::span<double> outputs) noexcept {
 
 void Plant::advance(double ticks) noexcept {
   if (!friction_.present()) {
-    step(ticks);
+    step(ticks, transition(ticks));
     return;
   }
   const auto pieces = static_cast<std::int64_t>(std::ceil(ticks * friction_substeps));
@@ -114,10 +124,9 @@ void Plant::advance(double ticks) noexcept {
   for (std::int64_t i = 0; i < pieces; ++i) step_with_friction(substep);
 }
 
-void Plant::step(double ticks) noexcept {
-  const Transition* known = transition(ticks);
+void Plant::step(double ticks, const Transition* known) noexcept {
   if (known == nullptr) {
-    integrate(state_, input_, ticks);
+    integrate(state_, b_, input_, ticks);
     return;
   }
   // Rows at a time, whose sums don't wait for each other.
@@ -135,29 +144,22 @@ void Plant::step(double ticks) noexcept {
 }
 
 // Time stepping with the friction force chosen at the end of the step: the force that stops the
-// motion if friction can give it, its full level against the motion otherwise. Friction acts where
-// the command does, so it is brought to the input by the gain.
+// motion if friction can give it, its full level against the motion otherwise. It acts on the
+// mechanics, behind a lag of the drive.
 void Plant::step_with_friction(double ticks) noexcept {
   const Transition* known = transition(ticks);
-  std::copy(state_.begin(), state_.end(), before_.begin());
-  double velocity_per_input = 0.0;
-  if (known != nullptr) {
-    velocity_per_input = dot(velocity_.data(), known->gamma.data(), n_);
-  } else {
-    std::fill(scratch_.begin(), scratch_.end(), 0.0);
-    integrate(scratch_, 1.0, ticks);
-    velocity_per_input = dot(velocity_.data(), scratch_.data(), n_);
+  step(ticks, known);
+  if (known == nullptr) {
+    std::fill(pushed_.begin(), pushed_.end(), 0.0);
+    integrate(pushed_, force_, 1.0, ticks);
   }
-  step(ticks);
+  const std::vector<double>& pushed = known != nullptr ? known->force : pushed_;
+  const double velocity_per_force = dot(velocity_.data(), pushed.data(), n_);
+  if (velocity_per_force == 0.0) return;
   const double free_velocity = dot(velocity_.data(), state_.data(), n_);
-  if (velocity_per_input == 0.0) return;
-  const double level = friction_.level(free_velocity) / std::abs(input_gain_);
-  const double force = std::clamp(free_velocity / velocity_per_input, -level, level);
-  state_.swap(before_);
-  const double drive = input_;
-  input_ = drive - force;
-  step(ticks);
-  input_ = drive;
+  const double level = friction_.level(free_velocity);
+  const double force = std::clamp(free_velocity / velocity_per_force, -level, level);
+  for (std::size_t i = 0; i < n_; ++i) state_[i] -= pushed[i] * force;
 }
 
 const Plant::Transition* Plant::transition(double ticks) noexcept {
@@ -180,19 +182,23 @@ void Plant::learn(Transition& slot, double ticks) noexcept {
   for (std::size_t j = 0; j <= n_; ++j) {
     std::fill(scratch_.begin(), scratch_.end(), 0.0);
     if (j < n_) scratch_[j] = 1.0;
-    integrate(scratch_, j < n_ ? 0.0 : 1.0, ticks);
+    integrate(scratch_, b_, j < n_ ? 0.0 : 1.0, ticks);
     std::copy_n(scratch_.begin(), n_, j < n_ ? &slot.phi[j * rows_] : slot.gamma.data());
   }
+  if (!friction_.present()) return;
+  std::fill(slot.force.begin(), slot.force.end(), 0.0);
+  integrate(slot.force, force_, 1.0, ticks);
 }
 
-// x(t + h) = x + Σ (A h)^k / k! · (A x + b u) h / (k + 1): the exponential series on a vector, in
-// pieces short enough for it to converge to the last bit in some twenty terms.
-void Plant::integrate(std::span<double> state, double input, double ticks) noexcept {
+// x(t + h) = x + Σ (A h)^k / k! · (A x + b u) h / (k + 1), b being `column`: the exponential series
+// on a vector, in pieces short enough for it to converge to the last bit in some twenty terms.
+void Plant::integrate(std::span<double> state, const std::vector<double>& column, double input,
+                      double ticks) noexcept {
   const auto pieces = static_cast<std::int64_t>(std::max(1.0, std::ceil(2.0 * norm_ * ticks)));
   const double h = ticks / static_cast<double>(pieces);
   for (std::int64_t piece = 0; piece < pieces; ++piece) {
     for (std::size_t i = 0; i < n_; ++i) {
-      term_[i] = (dot(a_.data() + i * n_, state.data(), n_) + b_[i] * input) * h;
+      term_[i] = (dot(a_.data() + i * n_, state.data(), n_) + column[i] * input) * h;
     }
     for (int k = 2; k < 40; ++k) {
       double largest_term = 0.0;

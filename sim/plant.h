@@ -33,7 +33,7 @@ struct PlantTime {
 
 // Force against motion: Coulomb level, and a Stribeck rise to the break-away level at rest.
 struct Friction {
-  double coulomb = 0.0;             // unit of force (input_gain · command)
+  double coulomb = 0.0;             // unit of force
   double breakaway = 0.0;           // at rest; 0 = the Coulomb level
   double stribeck_velocity = 0.01;  // the rise has fallen to 1/e at this velocity
 
@@ -46,14 +46,19 @@ class Plant {
   // Throws std::invalid_argument where friction is asked of a plant without a velocity.
   Plant(const LinearSystem& system, double period_s, Friction friction = {});
 
-  // The input becomes `value` at `time` (plus the dead time); times must not go back.
+  // The input becomes `value` at `time` (plus the dead time); times must not go back. Room is for
+  // the commands of the dead time at one per tick, and some.
   void apply(double value, PlantTime time) noexcept;
+
+  // Room for one more input under way. Allocates: for whoever is commanded faster than once a tick,
+  // outside the loop.
+  void make_room();
 
   // Carries the state to `time`, which must not go back, and writes every output.
   void sample(PlantTime time, std::span<double> outputs) noexcept;
 
   std::size_t outputs() const noexcept { return outputs_; }
-  double input() const noexcept { return input_; }  // at the time of the last sample
+  PlantTime time() const noexcept { return now_; }  // of the last sample
 
  private:
   struct Edge {
@@ -64,6 +69,7 @@ class Plant {
     double ticks = 0.0;
     std::vector<double> phi;    // n columns of rows_, zeros below
     std::vector<double> gamma;  // rows_
+    std::vector<double> force;  // likewise, of a unit force; empty without friction
   };
 
   std::size_t wrapped(std::size_t index) const noexcept {
@@ -74,21 +80,22 @@ class Plant {
     --edge_count_;
   }
   void advance(double ticks) noexcept;
-  void step(double ticks) noexcept;
+  void step(double ticks, const Transition* known) noexcept;
   void step_with_friction(double ticks) noexcept;
   const Transition* transition(double ticks) noexcept;
   void learn(Transition& slot, double ticks) noexcept;
-  void integrate(std::span<double> state, double input, double ticks) noexcept;
+  void integrate(std::span<double> state, const std::vector<double>& column, double input,
+                 double ticks) noexcept;
 
   std::size_t n_;
   std::size_t outputs_;
   double dead_ticks_;
   std::vector<double> a_;  // per tick, row-major
   std::vector<double> b_;
+  std::vector<double> force_;  // b of the force at the velocity
   std::vector<double> c_;
   std::vector<double> d_;
   std::vector<double> velocity_;
-  double input_gain_;
   Friction friction_;
   double norm_;  // of A per tick, with b
 
@@ -97,7 +104,7 @@ class Plant {
   std::vector<double> scratch_;
   std::vector<double> term_;
   std::vector<double> product_;
-  std::vector<double> before_;
+  std::vector<double> pushed_;
   PlantTime now_;
   double input_ = 0.0;
 

@@ -1,6 +1,7 @@
 #include "sim/simulated_rig.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -21,27 +22,16 @@ class SimulatedRig::Core {
  public:
   Core(const SimulatedRigSettings& settings, const Clock& clock);
 
-  // The command becomes the input of the plant, or of the loop around it. A controller reads before
-  // it writes: its plant has no direct feedthrough, so sampling first changes nothing.
-  // Returns the time, ns.
+  // The command becomes the input of the plant, or of the loop around it: a controller reads before
+  // it writes. What is sampled before now sees the input before, the rest the new one. Returns the
+  // time, ns.
   std::int64_t apply(double command) noexcept {
-    const Instant present = clock_.now();
-    const PlantTime now = plant_time(present, period_ns_);
-    const std::int64_t now_ns = clock_.time_ns(present);
-    if (!controller_) {
-      plant_.apply(command, now);
-      refresh(now, now_ns);
-      return now_ns;
-    }
-    refresh(now, now_ns);
-    plant_.sample(now, outputs_);
-    plant_.apply(controller_->step(command, outputs_[feedback_]).plant_input, now);
-    for (Channel& channel : channels_) {
-      if (channel.signal != Signal::plant_output) {
-        channel.history[channel.newest].value = loop_signal(channel.signal);
-      }
-    }
-    return now_ns;
+    const Present present = look();
+    const std::size_t sampled = at_the_tick_ ? 0 : sample_before(present);
+    const double input = controller_ ? control(command, present.time) : command;
+    for (Plant& plant : plants_) plant.apply(input, present.time);
+    sample_from(sampled, present);
+    return present.time_ns;
   }
 
   // The sample of a sensor's output; a second read without a command in between samples again.
@@ -50,9 +40,14 @@ class SimulatedRig::Core {
   double period_s() const noexcept { return period_ns_ * 1e-9; }
 
  private:
+  struct Present {
+    PlantTime time;
+    std::int64_t time_ns;
+  };
   struct Channel {
     Signal signal;
     std::size_t output;
+    std::size_t plant;
     double delay_ticks;
     double jitter_ticks;
     std::vector<Sample> history;  // ring: the sample of each of the last whole ticks of delay
@@ -63,57 +58,113 @@ class SimulatedRig::Core {
 
     std::size_t oldest() const noexcept { return newest + 1 == history.size() ? 0 : newest + 1; }
   };
+  struct LoopSignals {
+    PlantTime since;
+    Controller::Signals signals;
+  };
 
-  void refresh(PlantTime now, std::int64_t now_ns) noexcept;
-  double loop_signal(Signal signal) const noexcept;
-  void sample(Channel& channel, std::int64_t now_ns, PlantTime now) noexcept;
+  Present look() const noexcept {
+    const Instant instant = clock_.now();
+    return {.time = plant_time(instant, period_ns_), .time_ns = clock_.time_ns(instant)};
+  }
+  std::size_t sample_before(const Present& present) noexcept;
+  void sample_from(std::size_t first, const Present& present) noexcept;
+  void draw_instants(PlantTime now) noexcept;
+  double control(double command, PlantTime now) noexcept;
+  double loop_signal(Signal signal, PlantTime instant) const noexcept;
+  void sample(Channel& channel, const Present& present) noexcept;
+  static void keep(Channel& channel, double value, std::int64_t time_ns) noexcept {
+    channel.newest = channel.oldest();
+    channel.history[channel.newest] = {.value = value, .time_ns = time_ns};
+    channel.taken = false;
+  }
 
   const Clock& clock_;
   double period_ns_;
-  Plant plant_;
+  // One plant stands where the last of its channels was sampled. A channel that reaches behind the
+  // tick before, where others have been since, has a plant to itself: all get the same input.
+  std::vector<Plant> plants_;
   std::optional<Controller> controller_;
+  // Ring of the loop's latest signals: a channel reaches less than two ticks back, in which a late
+  // clock can have up to three commands before the present one.
+  std::array<LoopSignals, 4> loop_signals_;
+  std::size_t newest_signals_ = 0;
   std::size_t feedback_;
   std::vector<double> outputs_;
   std::vector<Channel> channels_;
   std::vector<std::size_t> order_;  // channels by sampling instant
+  bool at_the_tick_ = true;         // no fraction of a delay and no jitter: all are sampled at once
 };
 
 SimulatedRig::Core::Core(const SimulatedRigSettings& settings, const Clock& clock)
     : clock_{clock},
       period_ns_{clock.grid().period_s() * 1e9},
-      plant_{settings.system, clock.grid().period_s(), settings.friction},
+      plants_{Plant{settings.system, clock.grid().period_s(), settings.friction}},
       feedback_{settings.feedback},
-      outputs_(plant_.outputs()) {
+      outputs_(plants_.front().outputs()) {
   if (settings.controller) {
     if (settings.system.d(static_cast<Eigen::Index>(settings.feedback)) != 0.0) {
       throw std::invalid_argument(
           "a controller needs a plant without direct feedthrough to the output that it controls");
     }
     controller_.emplace(*settings.controller, clock.grid().period_s());
+    loop_signals_.fill({.since = {}, .signals = {.plant_input = settings.neutral}});
   }
   for (std::size_t i = 0; i < settings.sensors.size(); ++i) {
     const SimulatedSensor& sensor = settings.sensors[i];
+    // Delays that are whole ticks but for the rounding of the division are whole ticks.
     const double delay_ticks = sensor.imperfections.delay_s / period_s();
     const double whole = std::floor(delay_ticks + 1e-9);
-    // The scatter must stay within the tick that it belongs to.
+    const double fraction = delay_ticks - whole;
+    // The scatter must not change the order of the samples.
     const double jitter_ticks = sensor.imperfections.jitter_s / period_s();
     if (jitter_ticks >= 1.0) {
       throw std::invalid_argument("the jitter of a simulated sensor must be below one period");
     }
     channels_.push_back({.signal = sensor.signal,
                          .output = sensor.output,
-                         .delay_ticks = std::max(0.0, delay_ticks - whole),
+                         .plant = 0,
+                         .delay_ticks = fraction < 1e-9 ? 0.0 : fraction,
                          .jitter_ticks = jitter_ticks,
                          .history = std::vector<Sample>(static_cast<std::size_t>(whole) + 1),
                          .instant = {},
                          .jitter = std::mt19937_64{stream_seed(settings.seed, 100 + i)}});
+    if (sensor.signal == Signal::plant_output && fraction + jitter_ticks > 1.0) {
+      channels_.back().plant = plants_.size();
+      plants_.push_back(plants_.front());
+    }
     order_.push_back(i);
+    at_the_tick_ = at_the_tick_ && channels_.back().delay_ticks == 0.0 && jitter_ticks == 0.0;
   }
-  plant_.apply(settings.neutral, PlantTime{});
+  for (Plant& plant : plants_) plant.apply(settings.neutral, PlantTime{});
+}
+
+// What is due before now, while the input is what it was. Returns how many that were.
+std::size_t SimulatedRig::Core::sample_before(const Present& present) noexcept {
+  draw_instants(present.time);
+  std::size_t next = 0;
+  for (; next < order_.size() && channels_[order_[next]].instant - present.time < 0.0; ++next) {
+    sample(channels_[order_[next]], present);
+  }
+  return next;
+}
+
+void SimulatedRig::Core::sample_from(std::size_t first, const Present& present) noexcept {
+  if (!at_the_tick_) {
+    for (std::size_t n = first; n < order_.size(); ++n) sample(channels_[order_[n]], present);
+    return;
+  }
+  plants_.front().sample(present.time, outputs_);
+  for (Channel& channel : channels_) {
+    keep(channel,
+         channel.signal == Signal::plant_output ? outputs_[channel.output]
+                                                : loop_signal(channel.signal, present.time),
+         present.time_ns);
+  }
 }
 
 // Sensors are sampled in the order of their instants, so that the plant only ever moves forward.
-void SimulatedRig::Core::refresh(PlantTime now, std::int64_t now_ns) noexcept {
+void SimulatedRig::Core::draw_instants(PlantTime now) noexcept {
   for (Channel& channel : channels_) {
     double back = channel.delay_ticks;
     if (channel.jitter_ticks > 0.0) {
@@ -129,29 +180,50 @@ void SimulatedRig::Core::refresh(PlantTime now, std::int64_t now_ns) noexcept {
   if (!std::is_sorted(order_.begin(), order_.end(), earlier)) {
     std::sort(order_.begin(), order_.end(), earlier);
   }
-  for (const std::size_t i : order_) sample(channels_[i], now_ns, now);
 }
 
-void SimulatedRig::Core::sample(Channel& channel, std::int64_t now_ns, PlantTime now) noexcept {
-  plant_.sample(channel.instant, outputs_);
-  const double back_ns = (now - channel.instant) * period_ns_;
-  channel.newest = channel.oldest();
-  channel.history[channel.newest] = {.value = outputs_[channel.output],
-                                     .time_ns = now_ns - std::llround(back_ns)};
-  channel.taken = false;
+// The plant's input from now on. The feedback has no direct feedthrough: it is the same before and
+// after the input changes.
+double SimulatedRig::Core::control(double command, PlantTime now) noexcept {
+  plants_.front().sample(now, outputs_);
+  newest_signals_ = (newest_signals_ + 1) % loop_signals_.size();
+  loop_signals_[newest_signals_] = {.since = now,
+                                    .signals = controller_->step(command, outputs_[feedback_])};
+  return controller_->signals().plant_input;
 }
 
-double SimulatedRig::Core::loop_signal(Signal signal) const noexcept {
-  const Controller::Signals& signals = controller_->signals();
+double SimulatedRig::Core::loop_signal(Signal signal, PlantTime instant) const noexcept {
+  std::size_t held = newest_signals_;
+  for (std::size_t n = 1; n < loop_signals_.size() && instant - loop_signals_[held].since < 0.0;
+       ++n) {
+    held = held == 0 ? loop_signals_.size() - 1 : held - 1;
+  }
+  const Controller::Signals& signals = loop_signals_[held].signals;
   if (signal == Signal::error) return signals.error;
   return signal == Signal::control ? signals.control : signals.plant_input;
+}
+
+void SimulatedRig::Core::sample(Channel& channel, const Present& present) noexcept {
+  double value = 0.0;
+  if (channel.signal == Signal::plant_output) {
+    Plant& plant = plants_[channel.plant];
+    // After a late command, or read again, another channel may have been further: never a value of
+    // another instant than its stamp.
+    if (channel.instant - plant.time() < 0.0) channel.instant = plant.time();
+    plant.sample(channel.instant, outputs_);
+    value = outputs_[channel.output];
+  } else {
+    value = loop_signal(channel.signal, channel.instant);
+  }
+  const double back_ns = (present.time - channel.instant) * period_ns_;
+  keep(channel, value, present.time_ns - std::llround(back_ns));
 }
 
 Sample SimulatedRig::Core::take(std::size_t sensor) noexcept {
   Channel& channel = channels_[sensor];
   if (channel.taken) {
-    const Instant present = clock_.now();
-    refresh(plant_time(present, period_ns_), clock_.time_ns(present));
+    const Present present = look();
+    sample_from(at_the_tick_ ? 0 : sample_before(present), present);
   }
   channel.taken = true;
   return channel.history[channel.oldest()];

@@ -2,9 +2,9 @@
 // hardware. Runs on whatever clock the loop runs on, at the true time of each call.
 //
 // Per tick, in this order: the command is clamped, limited in slew, quantised and applied at the
-// present instant; every sensor is sampled at its own instant (now − delay ± jitter), at the
-// present instant after the command; then noise, quantisation, loss are added to what each read()
-// returns.
+// present instant; every sensor is sampled at its own instant (between now − delay − jitter and
+// now − delay), at the present instant after the command, a controller's included; then noise,
+// quantisation, loss are added to what each read() returns.
 #pragma once
 
 #include <cstdint>

@@ -28,6 +28,7 @@ void Axis::settle(std::int64_t time_ns) {
 
 void Axis::apply(double value, std::int64_t time_ns) {
   settle(time_ns);
+  plant_.make_room();
   plant_.apply(value, plant_time(time_ns_));
 }
 

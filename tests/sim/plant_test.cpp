@@ -1,7 +1,9 @@
 // The simulated plant against Eigen's matrix exponential, and its friction against mechanics.
 #include "sim/plant.h"
 
+#include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <random>
 #include <stdexcept>
 #include <unsupported/Eigen/MatrixFunctions>
@@ -215,6 +217,43 @@ TEST(Friction, BringsASlidingMassToRestAfterTheDistanceOfItsEnergy) {
   EXPECT_NEAR(stopped.velocity, 0.0, 1e-12);
   EXPECT_NEAR(stopped.position - pushed.position, distance, 1e-3 * distance);
   EXPECT_EQ(push(plant, 0.0, stop, stop + 5000).position, stopped.position);
+}
+
+// Behind the lag of its drive: friction is at the mass, at once, in closed form.
+TEST(Friction, DoesNotPassThroughTheLagOfTheDrive) {
+  constexpr double inertia = 0.01;
+  constexpr double gain = 4.0;
+  constexpr double coulomb = 0.5;
+  constexpr double lag_hz = 10.0;
+  constexpr double push_s = 0.1;  // with a force of 1
+  const double corner = 2.0 * std::numbers::pi * lag_hz;
+  const double slips_s = std::log(2.0) / corner;  // the force has come to that of friction
+  const auto pushed = [&](double t) {
+    const double impulse =
+        (t - slips_s) - (std::exp(-corner * slips_s) - std::exp(-corner * t)) / corner;
+    return (impulse - coulomb * (t - slips_s)) / inertia;
+  };
+  const auto let_go = [&](double t) {
+    const double force = 1.0 - std::exp(-corner * push_s);
+    const double impulse = force * (1.0 - std::exp(-corner * t)) / corner;
+    return pushed(push_s) + (impulse - coulomb * t) / inertia;
+  };
+  Plant plant{
+      from_mechanical_axis({.inertia = inertia, .gain = gain, .modes = {}, .lag_hz = lag_hz}),
+      period_s,
+      {.coulomb = coulomb}};
+  double peak = 0.0;
+  for (std::uint64_t tick = 1; tick <= 150; ++tick) {
+    const double t = static_cast<double>(tick) * period_s;
+    const double velocity = push(plant, t <= push_s ? 1.0 : 0.0, tick - 1, tick).velocity;
+    const double exact = t <= slips_s ? 0.0 : t <= push_s ? pushed(t) : let_go(t - push_s);
+    ASSERT_NEAR(velocity, exact, 1e-3) << t << " s";
+    peak = std::max(peak, velocity);
+  }
+  EXPECT_NEAR(peak, 3.90, 0.01);
+  const Motion stopped = push(plant, 0.0, 150, 400);
+  EXPECT_NEAR(stopped.velocity, 0.0, 1e-12);
+  EXPECT_NEAR(push(plant, 0.0, 400, 1000).position, stopped.position, 1e-12);
 }
 
 TEST(Friction, NeedsAPlantWithAVelocity) {

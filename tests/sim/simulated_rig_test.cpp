@@ -95,6 +95,54 @@ TEST(SensorJitter, ScattersTheInstantOverItsWidthAndTellsTheTrueTime) {
   EXPECT_NEAR(latest, 0.1e-3, 5e-6);
 }
 
+// What the sensor under test, the last of the rig, reads, with every other sensor read before it.
+std::vector<Sample> last_readings(const SimulatedRigSettings& settings, int ticks,
+                                  int reads_per_tick = 1) {
+  VirtualClock clock{TickGrid{rate_hz}};
+  SimulatedRig rig{settings, clock};
+  std::vector<Sample> samples;
+  for (int tick = 0; tick < ticks; ++tick) {
+    clock.wait();
+    rig.actuator().write(1.0);
+    for (int read = 0; read < reads_per_tick; ++read) {
+      for (std::size_t i = 0; i + 1 < settings.sensors.size(); ++i) rig.sensor(i).read();
+      samples.push_back(rig.sensor(settings.sensors.size() - 1).read());
+    }
+  }
+  return samples;
+}
+
+// Further back than the tick before, where another sensor or the controller has been since.
+TEST(SensorJitter, ReachesOverTwoTicksWhoeverElseLooksAtThePlant) {
+  SimulatedRigSettings alone = clockwork({.delay_s = 0.8e-3, .jitter_s = 0.9e-3});
+  SimulatedRigSettings beside_another = alone;
+  beside_another.sensors.insert(beside_another.sensors.begin(), SimulatedSensor{});
+  SimulatedRigSettings in_a_loop = alone;
+  in_a_loop.controller = {.injection = Injection::plant_input};
+  for (const auto& settings : {alone, beside_another, in_a_loop}) {
+    const auto samples = last_readings(settings, 4000);
+    double oldest_s = 0.0;
+    double youngest_s = 1.0;
+    for (std::size_t tick = 10; tick < samples.size(); ++tick) {
+      ASSERT_NEAR(seconds(samples[tick]), samples[tick].value, 1e-9);
+      const double age_s = static_cast<double>(tick) * 1e-3 - samples[tick].value;
+      oldest_s = std::max(oldest_s, age_s);
+      youngest_s = std::min(youngest_s, age_s);
+    }
+    EXPECT_NEAR(oldest_s, 1.7e-3, 5e-6);
+    EXPECT_NEAR(youngest_s, 0.8e-3, 5e-6);
+  }
+}
+
+TEST(SensorJitter, TellsTheTrueTimeOfASecondReadingToo) {
+  SimulatedRigSettings settings = clockwork({.delay_s = 0.3e-3, .jitter_s = 0.6e-3});
+  settings.sensors.insert(settings.sensors.begin(), SimulatedSensor{});
+  const auto samples = last_readings(settings, 200, 3);
+  for (std::size_t i = 30; i < samples.size(); ++i) {
+    ASSERT_NEAR(seconds(samples[i]), samples[i].value, 1e-9);
+  }
+}
+
 // Steady state of a lag under a sine: every sub-tick sample lies on the closed form.
 TEST(SensorDelay, SamplesTheHeldResponseBetweenTheTicks) {
   const test::PartialFractions lag{.poles = {-400.0L}, .residues = {400.0L}};
@@ -115,6 +163,104 @@ TEST(SensorDelay, SamplesTheHeldResponseBetweenTheTicks) {
       ASSERT_NEAR(sample.value, exact, 1e-12) << "age " << age_s << ", tick " << tick;
     }
   }
+}
+
+// A lag, and its rate with the direct feedthrough that it has, under proportional control.
+struct Loop {
+  static constexpr long double corner = 100.0L;
+  static constexpr long double proportional = 0.5L;
+  static constexpr long double period_s = 1e-3L;
+
+  SimulatedRigSettings settings(const SimulatedSensor& sensor) const {
+    SimulatedRigSettings rig;
+    const auto pole = static_cast<double>(corner);
+    rig.system =
+        from_state_space(Eigen::MatrixXd::Constant(1, 1, -pole), Eigen::VectorXd::Constant(1, pole),
+                         Eigen::Vector2d{1.0, -pole}, Eigen::Vector2d{0.0, pole}, {"y", "rate"});
+    rig.controller = {.proportional = static_cast<double>(proportional)};
+    rig.sensors = {sensor};
+    return rig;
+  }
+
+  // Over the reference, by whole ticks of the sensor's delay and the rest.
+  test::Complex response(const SimulatedSensor& sensor, long double omega) const {
+    const long double ticks = static_cast<long double>(sensor.imperfections.delay_s) / period_s;
+    const long double whole = std::floor(ticks + 1e-9L);
+    const long double rest_s = ticks - whole < 1e-9L ? 0.0L : (ticks - whole) * period_s;
+    const test::Complex tick_before = std::polar(1.0L, -omega * period_s);
+    return at_rest_age(sensor, omega, rest_s) * std::pow(tick_before, whole);
+  }
+
+  test::Complex at_rest_age(const SimulatedSensor& sensor, long double omega,
+                            long double age_s) const {
+    const test::PartialFractions lag{.poles = {-corner}, .residues = {corner}};
+    const test::PartialFractions rate{
+        .poles = {-corner}, .residues = {-corner * corner}, .direct = corner};
+    const test::Complex y = test::held_response(lag, omega, period_s);
+    const test::Complex error = 1.0L / (1.0L + proportional * y);
+    const test::Complex input = proportional * error;
+    if (sensor.signal == Signal::plant_output) {
+      return input * test::held_response(sensor.output == 0 ? lag : rate, omega, period_s, age_s);
+    }
+    // Held from the tick before.
+    const long double held_s = age_s > 0.0L ? period_s : 0.0L;
+    return (sensor.signal == Signal::error ? error : input) * std::polar(1.0L, -omega * held_s);
+  }
+};
+
+class SensorInALoop : public testing::TestWithParam<SimulatedSensor> {};
+
+TEST_P(SensorInALoop, SamplesTheClosedFormAtAnyAge) {
+  constexpr Loop loop;
+  constexpr long double omega = 2.0L * std::numbers::pi_v<long double> * 300.0L;
+  for (const double age_s : {0.0, 0.123e-3, 0.3e-3, 0.999e-3, 1e-3, 2e-3, 3.3e-3}) {
+    SimulatedSensor sensor = GetParam();
+    sensor.imperfections.delay_s = age_s;
+    const test::Complex response = loop.response(sensor, omega);
+    VirtualClock clock{TickGrid{rate_hz}};
+    SimulatedRig rig{loop.settings(sensor), clock};
+    for (int tick = 0; tick < 600; ++tick) {
+      clock.wait();
+      const long double angle = omega * static_cast<long double>(tick) * 1e-3L;
+      rig.actuator().write(static_cast<double>(std::sin(angle)));
+      const Sample sample = rig.sensor(0).read();
+      if (tick < 400) continue;
+      const auto exact = static_cast<double>((response * std::polar(1.0L, angle)).imag());
+      ASSERT_NEAR(sample.value, exact, 1e-10) << "age " << age_s << ", tick " << tick;
+    }
+  }
+}
+
+std::string name_of(const testing::TestParamInfo<SimulatedSensor>& sensor) {
+  constexpr const char* names[] = {"PlantOutput", "Error", "Control", "PlantInput"};
+  return names[static_cast<int>(sensor.param.signal)] + std::to_string(sensor.param.output);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, SensorInALoop,
+    testing::Values(SimulatedSensor{.output = 0, .imperfections = {}},
+                    SimulatedSensor{.output = 1, .imperfections = {}},
+                    SimulatedSensor{.signal = Signal::error, .imperfections = {}},
+                    SimulatedSensor{.signal = Signal::control, .imperfections = {}},
+                    SimulatedSensor{.signal = Signal::plant_input, .imperfections = {}}),
+    name_of);
+
+// As `sinerig check` does: no command, and more than one reading.
+TEST(ALoopSignal, IsReadWithoutACommandToo) {
+  SimulatedRigSettings settings =
+      Loop{}.settings({.signal = Signal::plant_input, .imperfections = {}});
+  settings.neutral = 0.25;
+  VirtualClock clock{TickGrid{rate_hz}};
+  SimulatedRig rig{settings, clock};
+  for (int tick = 0; tick < 3; ++tick) {
+    clock.wait();
+    EXPECT_EQ(rig.sensor(0).read().value, 0.25);
+  }
+  rig.actuator().write(2.0);
+  const double input = rig.sensor(0).read().value;
+  EXPECT_NE(input, 0.25);
+  clock.wait();
+  EXPECT_EQ(rig.sensor(0).read().value, input);
 }
 
 TEST(SimulatedSensor, AddsBiasAndDrift) {
