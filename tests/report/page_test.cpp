@@ -1,4 +1,5 @@
 // The report in a real browser: it renders, its switches and cursors work, nothing complains.
+#include <complex>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -229,6 +230,18 @@ TEST_F(Page, ShowsTheLoopWithItsMarginsAndTheNotch) {
   EXPECT_NE(text("#tables").find("Proposed notch"), std::string::npos);
   keep_picture("loop");
   press("rad/s");
+  expect_no_errors();
+}
+
+// atan2 of 0.6 k and 0.8 k is the same angle up to a unit in the last place.
+TEST_F(Page, DrawsAPhaseThatIsConstantUpToRounding) {
+  LabelledRun run = run_of(30);
+  for (record::StoredPoint& point : run.run.responses.front().points) {
+    point.response = (1.0 + point.dwell) * std::complex<double>{0.6, 0.8};
+    point.dof = 0.0;  // without an interval
+  }
+  show(run);
+  EXPECT_LT(browser_->evaluate("document.querySelectorAll('#phase text').length").get<int>(), 100);
   expect_no_errors();
 }
 
