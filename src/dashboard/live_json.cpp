@@ -60,9 +60,11 @@ std::string text_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-Json head_json(const std::string& label, const record::StoredRun& run, bool in_real_time) {
+Json head_json(const std::string& label, const record::StoredRun& run, const std::string& id,
+               bool in_real_time) {
   Json page = report::page_of_run({.label = label, .run = run});
   page["kind"] = "live";
+  page["id"] = id;
   page["summary"] = Json::array();
   double low = unlimited;
   double high = 0.0;

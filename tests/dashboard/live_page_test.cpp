@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <numbers>
 
 #include <gtest/gtest.h>
@@ -30,15 +31,35 @@ class LivePage : public testing::Test {
     const auto program = test::Browser::find();
     if (!program) GTEST_SKIP() << "no Chromium here (Debian: apt install chromium)";
     play();
-    server_ = std::make_unique<Server>(Server::Settings{.address = parse_address(":0"),
+    serve(live_, ":0");
+    browser_ = std::make_unique<test::Browser>(*program);
+  }
+
+  void serve(LiveRun& run, const std::string& address) {
+    server_.reset();
+    server_ = std::make_unique<Server>(Server::Settings{.address = parse_address(address),
                                                         .token = random_token(),
                                                         .stop =
                                                             [this] {
                                                               ++stops_;
                                                             }},
-                                       live_);
-    browser_ = std::make_unique<test::Browser>(*program);
+                                       run);
   }
+
+  LiveSetup setup() {
+    LiveSetup setup = test::served_setup(plan_);
+    setup.stop_requests = [this] {
+      const std::scoped_lock lock{silence_};
+      return stops_.load();
+    };
+    return setup;
+  }
+
+  bool wait_for_text(const std::string& id, const std::string& text) {
+    return browser_->wait_until("document.getElementById('" + id + "').textContent === '" + text +
+                                "'");
+  }
+  void press_stop() { browser_->evaluate("document.getElementById('stop').click()"); }
 
   explicit LivePage(SweepPlan plan = test::served_plan(points),
                     sim::SimulatedRigSettings rig = test::served_rig())
@@ -90,7 +111,8 @@ class LivePage : public testing::Test {
   RecordLog log_;
   std::size_t told_ = 0;
   std::atomic<int> stops_{0};
-  LiveRun live_{test::served_setup(plan_), lateness_};
+  std::mutex silence_;  // while it is held the server tells nothing
+  LiveRun live_{setup(), lateness_};
   std::unique_ptr<Server> server_;
   std::unique_ptr<test::Browser> browser_;
 };
@@ -150,6 +172,97 @@ TEST_F(LivePage, StopButtonStopsWithTheToken) {
   EXPECT_TRUE(browser_->wait_until(
       "document.getElementById('chip').textContent === 'interrupted: stop requested'"));
   expect_no_errors();
+}
+
+constexpr const char* stopping = "Stopping – press again for neutral at once";
+
+TEST_F(LivePage, SaysThatItStopsOnlyWhereItDoes) {
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  tell_until(2);
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('where').textContent.startsWith('3 of 30')"));
+  // The first request is refused. Until then the page only says that it asks, and its stream has
+  // left a connection for the request.
+  browser_->evaluate(
+      "EventSource.prototype.shut = EventSource.prototype.close;"
+      "EventSource.prototype.close = function() { window.closed_first = true; this.shut(); };"
+      "window.ask = window.fetch;"
+      "window.fetch = (...all) => { window.fetch = window.ask;"
+      "  window.seen = [document.getElementById('stop').textContent, window.closed_first,"
+      "                 all[1].signal instanceof AbortSignal];"
+      "  return Promise.resolve(new Response('No.', { status: 403 })); }; 0");
+  press_stop();
+  EXPECT_TRUE(wait_for_text("trouble", "Not stopped: No. Use Ctrl-C in the terminal."));
+  EXPECT_EQ(browser_->evaluate("window.seen"), nlohmann::json({"Asking …", true, true}));
+  EXPECT_TRUE(wait_for_text("stop", "Stop"));
+  EXPECT_EQ(stops_.load(), 0);
+  // The page goes on, and so does its button.
+  tell_until(5);
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('where').textContent.startsWith('6 of 30')"));
+  press_stop();
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  EXPECT_EQ(stops_.load(), 1);
+  EXPECT_TRUE(wait_for_text("trouble", ""));
+  tell_until(9);
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('where').textContent.startsWith('10 of 30')"));
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('.points tbody tr').length === 9"));
+  expect_no_errors();
+}
+
+// What the next press does is known to the program only: others stop the run, too.
+TEST_F(LivePage, NamesOnItsButtonWhatAnyoneHasAskedFor) {
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  EXPECT_TRUE(wait_for_text("stop", "Stop"));
+  stops_ = 1;  // another watcher, or Ctrl-C
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  browser_->open("about:blank", 900, 700);
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  press_stop();
+  EXPECT_TRUE(wait_for_text("stop", "Neutral at once"));
+  expect_no_errors();
+}
+
+TEST_F(LivePage, NoticesThatNothingIsToldAnyMore) {
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('chip')"));
+  EXPECT_TRUE(wait_for_text("chip", "running"));
+  {
+    const std::scoped_lock lock{silence_};
+    EXPECT_TRUE(wait_for_text("chip", "no connection"));
+    press_stop();
+    EXPECT_TRUE(wait_for_text("trouble", "No answer within 3 s. Use Ctrl-C in the terminal."));
+    EXPECT_TRUE(wait_for_text("stop", "Stop"));
+  }
+  EXPECT_TRUE(wait_for_text("chip", "running"));
+}
+
+// A run that is killed and resumed, or the next one, has the port of the one before.
+TEST_F(LivePage, DoesNotMixTwoRuns) {
+  browser_->open(server_->url(), 900, 700);
+  tell_until(5);
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('.points tbody tr').length === 5"));
+  LiveSetup next = setup();
+  next.label = "the next";
+  LiveRun other{std::move(next), lateness_};
+  const std::string place = server_->address().text();
+  serve(other, place);
+  EXPECT_TRUE(browser_->wait_until("document.querySelector('h1')?.textContent === 'the next'"));
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('.points tbody tr').length"), 0);
+  // The token that it has was for the other run.
+  EXPECT_TRUE(browser_->evaluate("document.getElementById('stop').disabled").get<bool>());
+  // Its address with the right one, pasted over this page's, is no new page to the browser.
+  browser_->evaluate("location.href = '" + server_->url() + "'; 0");
+  EXPECT_TRUE(browser_->wait_until("document.getElementById('stop')?.disabled === false"));
+  press_stop();
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  EXPECT_EQ(stops_.load(), 1);
+  server_.reset();  // before what it tells of
 }
 
 TEST_F(LivePage, WithoutATokenItOnlyWatches) {
