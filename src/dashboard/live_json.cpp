@@ -65,6 +65,7 @@ Json head_json(const std::string& label, const record::StoredRun& run, const std
   Json page = report::page_of_run({.label = label, .run = run});
   page["kind"] = "live";
   page["id"] = id;
+  page["outcome"] = page["outcome_text"] = "";
   page["summary"] = Json::array();
   double low = unlimited;
   double high = 0.0;

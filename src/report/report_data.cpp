@@ -238,11 +238,10 @@ Json page_of_run(const LabelledRun& labelled) {
   Json responses = Json::array();
   for (const StoredResponse& response : run.responses)
     responses.push_back(response_json(run, response, response_name(run, response), 0));
-  const std::string outcome = run.fact("outcome");
   return {{"kind", "run"},
           {"title", labelled.label},
           {"about", about_run(run)},
-          {"outcome", outcome},
+          {"outcome", outcome_of(run)},
           {"outcome_text", outcome_text(run)},
           {"summary", summary_facts(run)},
           {"runs", Json::array({run_json(labelled)})},

@@ -265,6 +265,23 @@ TEST_F(Page, SurvivesARunWithoutPoints) {
   expect_no_errors();
 }
 
+// As after a power cut: nothing in the file says how it ended.
+TEST_F(Page, SaysThatARunWasNotFinished) {
+  LabelledRun run = run_of(12);
+  run.run.facts.erase("outcome");
+  run.run.responses.front().points.resize(7);
+  show(run);
+  EXPECT_EQ(text(".outcome"), "not finished");
+  EXPECT_TRUE(browser_->evaluate("document.querySelector('.outcome').classList.contains('bad')")
+                  .get<bool>());
+  EXPECT_NE(text(".facts").find("of 12 planned"), std::string::npos) << text(".facts");
+  // An import is no run: it has not been cut short.
+  run.run.facts["imported_from"] = "bench.csv";
+  show(run);
+  EXPECT_TRUE(browser_->evaluate("!document.querySelector('.outcome')").get<bool>());
+  expect_no_errors();
+}
+
 TEST_F(Page, HoldsFiveHundredPointsInUnderAMegabyte) {
   show(run_of(500));
   EXPECT_LT(std::filesystem::file_size(path_), 1'000'000U);
