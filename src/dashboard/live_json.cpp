@@ -150,6 +150,8 @@ Json headroom_json(const std::vector<Headroom>& rows) {
                    {"max", rounded(row.max, 6)},
                    {"low", rounded(row.seen ? row.low : nothing, 5)},
                    {"high", rounded(row.seen ? row.high : nothing, 5)},
+                   {"lasting_s", rounded(row.lasting_s, 6)},
+                   {"left", rounded(row.left(), 4)},
                    {"used", rounded(row.used(), 4)}});
   }
   return all;

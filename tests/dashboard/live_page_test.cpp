@@ -1,5 +1,6 @@
 // The live page in a real browser: it follows a run to its end, its Stop button stops it, nothing
 // complains. The run is in virtual time and goes on when the test says so.
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
@@ -48,6 +49,7 @@ class LivePage : public testing::Test {
 
   LiveSetup setup() {
     LiveSetup setup = test::served_setup(plan_);
+    setup.limits = limits_;
     setup.stop_requests = [this] {
       const std::scoped_lock lock{silence_};
       return stops_.load();
@@ -62,8 +64,9 @@ class LivePage : public testing::Test {
   void press_stop() { browser_->evaluate("document.getElementById('stop').click()"); }
 
   explicit LivePage(SweepPlan plan = test::served_plan(points),
-                    sim::SimulatedRigSettings rig = test::served_rig())
-      : plan_{std::move(plan)}, rig_{std::move(rig)} {}
+                    sim::SimulatedRigSettings rig = test::served_rig(),
+                    GuardSettings limits = test::served_limits())
+      : plan_{std::move(plan)}, rig_{std::move(rig)}, limits_{std::move(limits)} {}
 
   // The whole run, its records kept to be told bit by bit.
   void play() {
@@ -106,6 +109,7 @@ class LivePage : public testing::Test {
 
   SweepPlan plan_;
   sim::SimulatedRigSettings rig_;
+  GuardSettings limits_;  // that the page shows
   Lateness lateness_;
   RunControl control_;
   RecordLog log_;
@@ -263,6 +267,65 @@ TEST_F(LivePage, DoesNotMixTwoRuns) {
   EXPECT_TRUE(wait_for_text("stop", stopping));
   EXPECT_EQ(stops_.load(), 1);
   server_.reset();  // before what it tells of
+}
+
+TEST_F(LivePage, LeavesGapsWhereSamplesAreMissing) {
+  for (Record& record : log_.records) {
+    auto* samples = std::get_if<TickSamples>(&record);
+    if (samples == nullptr || samples->tick % 100 >= 20) continue;
+    for (const std::size_t channel : {command_channel, first_sensor_channel})
+      samples->values[channel] = std::nan("");
+  }
+  browser_->open(server_->url(), 1440, 1000);
+  tell_until(2);
+  EXPECT_TRUE(browser_->wait_until("!!document.querySelector('#lissajous .curve')"));
+  const auto pieces = [&](const std::string& selector) {
+    return browser_
+        ->evaluate("document.querySelector('" + selector +
+                   "').getAttribute('d').split('M').length - 1")
+        .get<int>();
+  };
+  EXPECT_GT(pieces("#lissajous .curve"), 1);
+  EXPECT_GT(pieces("#signal .command"), 1);
+  EXPECT_FALSE(
+      browser_->evaluate("document.getElementById('now').innerHTML.includes('NaN')").get<bool>());
+  expect_no_errors();
+}
+
+GuardSettings single_limits() {
+  GuardSettings limits;
+  limits.channels.resize(1);
+  limits.channels[0].max = 2.0;
+  limits.channels[0].velocity = {.soft = 900.0, .hard = 1000.0};
+  limits.channels[0].following = {.hard = 3.0};
+  limits.channels[0].following_ns = 100'000'000;
+  return limits;
+}
+
+class SingleLimitsLivePage : public LivePage {
+ protected:
+  SingleLimitsLivePage()
+      : LivePage{test::served_plan(points), test::served_rig(), single_limits()} {}
+};
+
+TEST_F(SingleLimitsLivePage, ShowsWhatIsLeftOfThem) {
+  browser_->open(server_->url(), 1440, 1000);
+  tell_until(5);
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('#guard tr').length === 4"));
+  const auto cell = [&](int row, int column) {
+    return browser_
+        ->evaluate("document.querySelectorAll('#guard tr')[" + std::to_string(row) + "].cells[" +
+                   std::to_string(column) + "].textContent")
+        .get<std::string>();
+  };
+  EXPECT_TRUE(cell(0, 2).ends_with(" left")) << cell(0, 2);
+  EXPECT_EQ(cell(1, 0), "gyro velocity");
+  EXPECT_TRUE(cell(1, 2).ends_with(" %")) << cell(1, 2);
+  EXPECT_EQ(cell(2, 0), "gyro velocity, soft");
+  EXPECT_EQ(cell(3, 3), "± 3.00 rad/s for 100 ms");
+  EXPECT_EQ(cell(3, 2).find('%'), std::string::npos) << cell(3, 2);
+  keep_picture("live-limits");
+  expect_no_errors();
 }
 
 TEST_F(LivePage, WithoutATokenItOnlyWatches) {
