@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -31,19 +30,6 @@ std::string label_of(const std::string& file, const std::vector<std::string>& fi
   return label;
 }
 
-// The files beside the first of which no point could be compared.
-std::vector<std::string> files_without_points(const std::vector<report::LabelledRun>& runs,
-                                              const std::vector<Difference>& differences) {
-  std::vector<std::string> labels;
-  for (std::size_t i = 1; i < runs.size(); ++i) {
-    const bool compared = std::any_of(
-        differences.begin(), differences.end(),
-        [&](const Difference& each) { return each.file == runs[i].label && each.compared(); });
-    if (!compared) labels.push_back(runs[i].label);
-  }
-  return labels;
-}
-
 }  // namespace
 
 int compare_command(const CompareOptions& options) {
@@ -54,7 +40,9 @@ int compare_command(const CompareOptions& options) {
 
   bool changed = false;
   for (const Difference& difference : differences) changed = changed || difference.changed();
-  const std::vector<std::string> incomparable = files_without_points(runs, differences);
+  std::vector<std::string> labels;
+  for (const report::LabelledRun& run : runs) labels.push_back(run.label);
+  const std::vector<std::string> incomparable = report::files_without_points(labels, differences);
   if (incomparable.size() + 1 == runs.size() && !changed) {
     throw record::SweepFileError(
         "nothing to compare: the files have no frequency in common at which both points are good");
@@ -63,8 +51,6 @@ int compare_command(const CompareOptions& options) {
     spdlog::warn("{}: nothing to compare, no frequency at which both points are good", label);
   std::vector<report::Drift> drifts;
   if (options.drift || has_controller(options.loop)) {
-    std::vector<std::string> labels;
-    for (const report::LabelledRun& run : runs) labels.push_back(run.label);
     drifts = drift_of(options.files, labels,
                       {.loop = options.loop,
                        .channel = options.channel,

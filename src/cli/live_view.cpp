@@ -10,13 +10,17 @@ namespace sinerig::cli {
 
 namespace {
 
-dashboard::LiveSetup setup_of(const config::Rig& rig, const SweepPlan& plan) {
+dashboard::LiveSetup setup_of(const config::Rig& rig, const SweepPlan& plan,
+                              const RunControl& control) {
   const bool in_real_time = rig.clock == config::ClockKind::monotonic;
   dashboard::LiveSetup setup{.label = std::filesystem::path{rig.file->name()}.stem().string(),
                              .run = {},
                              .limits = rig.guard,
                              .in_real_time = in_real_time,
-                             .preflight = rig.runner.preflight.wanted};
+                             .preflight = rig.runner.preflight.wanted,
+                             .stop_requests = [&control] {
+                               return control.stop_requests.load();
+                             }};
   record::StoredRun& run = setup.run;
   run.facts = {{"rig_name", rig.file->name()},
                {"rig_text", rig.file->text()},
@@ -42,7 +46,7 @@ dashboard::LiveSetup setup_of(const config::Rig& rig, const SweepPlan& plan) {
 LiveView::LiveView(const std::string& address, const config::Rig& rig, const SweepPlan& plan,
                    Clock& clock, RunControl& control)
     : clock_{clock, lateness_},
-      run_{setup_of(rig, plan), lateness_},
+      run_{setup_of(rig, plan, control), lateness_},
       server_{{.address = dashboard::parse_address(address),
                .token = dashboard::random_token(),
                .stop =

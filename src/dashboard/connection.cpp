@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <poll.h>
 #include <unistd.h>
 
@@ -24,6 +25,20 @@ Text event(const char* name, const std::string& id, const std::string& data) {
 }
 
 }  // namespace
+
+std::string position_text(const Position& position) {
+  return std::string{position.run} + "-" + std::to_string(position.entry);
+}
+
+Position position_in(std::string_view text) {
+  Position position;
+  if (const std::size_t dash = text.find('-'); dash != std::string_view::npos) {
+    position.run = text.substr(0, dash);
+    text.remove_prefix(dash + 1);
+  }
+  std::from_chars(text.data(), text.data() + text.size(), position.entry);
+  return position;
+}
 
 Connection::Connection(int socket, Time now) : socket_{socket}, since_{now} {}
 
@@ -65,7 +80,7 @@ void Connection::feed(LiveRun& run, const Text& status, std::uint64_t tick, cons
   if (!streaming_ || !idle() || ended_) return;
   std::size_t next = next_entry_;
   if (const Text entries = run.log(next_entry_, next)) {
-    first_ = event("log", std::to_string(next), *entries);
+    first_ = event("log", position_text({.run = run.id(), .entry = next}), *entries);
     next_entry_ = next;
   } else if (tick != status_seen_ && status) {
     first_ = event("status", "", *status);

@@ -6,11 +6,22 @@
 #include <chrono>
 #include <cstdint>
 #include <string>
+#include <string_view>
 
 #include "dashboard/http_request.h"
 #include "dashboard/live_run.h"
 
 namespace sinerig::dashboard {
+
+// Where in the log of which run a page is: the id of an event, "RUN-17".
+struct Position {
+  std::string_view run{};  // empty: of whichever run
+  std::size_t entry = 0;
+};
+
+std::string position_text(const Position& position);
+// Begins with the first entry where the text is none.
+Position position_in(std::string_view text);
 
 class Connection {
  public:

@@ -60,9 +60,12 @@ std::string text_of(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-Json head_json(const std::string& label, const record::StoredRun& run, bool in_real_time) {
+Json head_json(const std::string& label, const record::StoredRun& run, const std::string& id,
+               bool in_real_time) {
   Json page = report::page_of_run({.label = label, .run = run});
   page["kind"] = "live";
+  page["id"] = id;
+  page["outcome"] = page["outcome_text"] = "";
   page["summary"] = Json::array();
   double low = unlimited;
   double high = 0.0;
@@ -147,6 +150,8 @@ Json headroom_json(const std::vector<Headroom>& rows) {
                    {"max", rounded(row.max, 6)},
                    {"low", rounded(row.seen ? row.low : nothing, 5)},
                    {"high", rounded(row.seen ? row.high : nothing, 5)},
+                   {"lasting_s", rounded(row.lasting_s, 6)},
+                   {"left", rounded(row.left(), 4)},
                    {"used", rounded(row.used(), 4)}});
   }
   return all;

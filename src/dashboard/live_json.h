@@ -18,9 +18,10 @@ using Json = nlohmann::ordered_json;
 // One line; bytes that are no UTF-8 are replaced.
 std::string text_of(const Json& json);
 
-// The page's data without a point: what a report has, and `range` (Hz), `dwells`, `least_s`,
+// The page's data without a point: what a report has, and `id`, `range` (Hz), `dwells`, `least_s`,
 // `most_s`, `channels`, `pairs` (input and output channel of each response).
-Json head_json(const std::string& label, const record::StoredRun& run, bool in_real_time);
+Json head_json(const std::string& label, const record::StoredRun& run, const std::string& id,
+               bool in_real_time);
 
 // {responses: [{r, columns…}], timing: {f, late_us, histogram}, events}. `added`: the dwells that
 // follow those of the plan.

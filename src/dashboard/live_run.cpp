@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "dashboard/live_json.h"
+#include "dashboard/token.h"
 #include "record/stored_point.h"
 #include "report/report_data.h"
 
@@ -61,8 +62,9 @@ struct LiveRun::Moment {
 LiveRun::LiveRun(LiveSetup setup, const Lateness& lateness)
     : setup_{std::move(setup)},
       lateness_{lateness},
+      id_{random_token()},
       head_{std::make_shared<const std::string>(
-          text_of(head_json(setup_.label, setup_.run, setup_.in_real_time)))},
+          text_of(head_json(setup_.label, setup_.run, id_, setup_.in_real_time)))},
       where_{setup_.run.plan, setup_.preflight},
       scope_{setup_.run.channels.size(), setup_.limits, names_of(setup_.run), units_of(setup_.run),
              setup_.run.plan.rate_hz},
@@ -186,7 +188,8 @@ Text LiveRun::status() {
             {"dwell_s", rounded(now.dwell_s, 5)},
             {"late_us", rounded(1e-3 * static_cast<double>(lateness_.last_ns.load()), 4)},
             {"late_max_us", rounded(1e-3 * static_cast<double>(lateness_.max_ns.load()), 4)},
-            {"skipped", lateness_.skipped.load()}};
+            {"skipped", lateness_.skipped.load()},
+            {"stop_requests", setup_.stop_requests ? setup_.stop_requests() : 0}};
   if (now.dwell) {
     json["hz"] = Json::array();
     for (const Tone& tone : now.dwell->tones)

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -29,6 +30,8 @@ struct LiveSetup {
   GuardSettings limits;
   bool in_real_time = true;
   bool preflight = false;  // the sweep begins with one
+  // How often a stop was asked for, from wherever: 1 ramps down, 2 is neutral at once.
+  std::function<int()> stop_requests{};
 };
 
 struct Ending {
@@ -49,6 +52,8 @@ class LiveRun {
   // When all has been taken.
   void finish(Ending ending);
 
+  // A name that no other run has: what a page knows is of this run or of another.
+  const std::string& id() const { return id_; }
   // Server's thread. The page's data before the first point, fixed for the run.
   const Text& head() const { return head_; }
   // What has happened up to now, counted; a message holds the entries from `from` on, `next` is
@@ -67,6 +72,7 @@ class LiveRun {
 
   LiveSetup setup_;
   const Lateness& lateness_;
+  std::string id_;
   Text head_;
 
   std::mutex mutex_;  // guards what is below

@@ -4,7 +4,6 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
-#include <charconv>
 #include <csignal>
 #include <cstring>
 #include <fcntl.h>
@@ -17,7 +16,6 @@
 #include <vector>
 
 #include <sys/eventfd.h>
-#include <sys/random.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 
@@ -45,12 +43,6 @@ void step_back() {
   pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary);
   setpriority(PRIO_PROCESS, 0, 10);  // of this thread only, on Linux
   pthread_setname_np(pthread_self(), "sinerig-page");
-}
-
-std::size_t number_in(std::string_view text) {
-  std::size_t value = 0;
-  std::from_chars(text.data(), text.data() + text.size(), value);
-  return value;
 }
 
 }  // namespace
@@ -179,7 +171,17 @@ class Server::Loop {
     const std::string_view since = request.last_event_id.empty()
                                        ? query_value(request.query, "since")
                                        : std::string_view{request.last_event_id};
-    client.stream(head("200 OK", "text/event-stream", nullptr), number_in(since));
+    follow(client, position_in(since));
+  }
+
+  // A page that is of another run, of before this one on the same port, must not go on with this.
+  void follow(Connection& client, const Position& from) {
+    const Text stream = head("200 OK", "text/event-stream", nullptr);
+    if (!from.run.empty() && from.run != run_.id()) {
+      static const Text reload = std::make_shared<const std::string>("event: reload\ndata: {}\n\n");
+      return client.answer(stream, reload);
+    }
+    client.stream(stream, from.entry);
   }
 
   // A page of another site that has its name resolve to this machine must not get to read this one.
@@ -194,6 +196,9 @@ class Server::Loop {
                     "Stopping needs the token: open the address that sinerig printed.\n");
     }
     settings_.stop();
+    // Before anything else is told: no page may say less than what has been asked for.
+    status_ = run_.status();
+    ++status_number_;
     client.answer(head("204 No Content", "text/plain", std::make_shared<const std::string>()),
                   nullptr);
   }
@@ -247,19 +252,6 @@ std::string Server::url() const {
            "/#token=" + loop_->settings().token;
   }
   return "http://" + shown.text() + "/#token=" + loop_->settings().token;
-}
-
-std::string random_token() {
-  std::array<unsigned char, 16> bytes{};
-  if (getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size()))
-    throw std::runtime_error{"the kernel gives no random numbers for the token of the live page"};
-  std::string text;
-  for (const unsigned char byte : bytes) {
-    constexpr const char* digits = "0123456789abcdef";
-    text += digits[byte >> 4U];
-    text += digits[byte & 0xFU];
-  }
-  return text;
 }
 
 }  // namespace sinerig::dashboard

@@ -9,6 +9,7 @@
 
 #include "dashboard/address.h"
 #include "dashboard/live_run.h"
+#include "dashboard/token.h"
 
 namespace sinerig::dashboard {
 
@@ -38,8 +39,5 @@ class Server {
   class Loop;
   std::unique_ptr<Loop> loop_;
 };
-
-// 128 bits from the kernel, in hexadecimal.
-std::string random_token();
 
 }  // namespace sinerig::dashboard

@@ -10,6 +10,7 @@ namespace sinerig::report {
 namespace {
 
 constexpr double round_off = 1e-9;
+constexpr int most_ticks = 1000;  // far above what any picture has room for
 
 // 2·10⁻⁷ for a value of one digit.
 std::string power_label(double value) {
@@ -52,8 +53,14 @@ double angle_step(double span_deg, double count) {
 
 Ticks linear_ticks(double low, double high, double step) {
   Ticks ticks;
-  for (double i = std::ceil(low / step - round_off); i * step <= high + step * round_off; ++i)
-    ticks.major.push_back(i * step);
+  const double first = std::ceil(low / step - round_off);
+  for (int i = 0; i < most_ticks; ++i) {
+    const double value = (first + i) * step;
+    if (!(value <= high + step * round_off)) break;
+    // Where the step is below the rounding of the values the next tick is this one again.
+    if (!ticks.major.empty() && !(value > ticks.major.back())) break;
+    ticks.major.push_back(value);
+  }
   return ticks;
 }
 

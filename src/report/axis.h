@@ -28,6 +28,7 @@ double nice_step(double span, double count);
 // The same for degrees: 15, 30, 45, 90, 180, 360 … from 15 up.
 double angle_step(double span_deg, double count);
 
+// The multiples of `step` in [low, high], a thousand at most.
 Ticks linear_ticks(double low, double high, double step);
 
 // Decades, or 1-2-5 where there is room for `room` labels; equal steps inside one decade.

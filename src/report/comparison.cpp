@@ -10,8 +10,6 @@
 
 namespace sinerig::report {
 
-namespace {
-
 using record::Difference;
 using record::PointDifference;
 using record::text;
@@ -39,7 +37,31 @@ std::string verdict(const Difference& difference) {
   return words;
 }
 
-}  // namespace
+std::string brief_verdict(const Difference& difference) {
+  const std::size_t changed = difference.changed_points();
+  if (changed > 0) return text("%zu of %zu points changed", changed, difference.points.size());
+  if (difference.changed())
+    return text("changed: %zu of %zu points lost", difference.lost,
+                difference.points.size() + difference.lost);
+  return difference.compared() ? text("same in %zu points", difference.points.size())
+                               : "nothing to compare";
+}
+
+const char* verdict_word(const Difference& difference) {
+  return difference.changed() ? "changed" : difference.compared() ? "same" : "nothing compared";
+}
+
+std::vector<std::string> files_without_points(const std::vector<std::string>& files,
+                                              const std::vector<Difference>& differences) {
+  std::vector<std::string> without;
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    const bool compared = std::any_of(
+        differences.begin(), differences.end(),
+        [&](const Difference& each) { return each.file == files[i] && each.compared(); });
+    if (!compared) without.push_back(files[i]);
+  }
+  return without;
+}
 
 void print_comparison(std::ostream& stream, const std::string& first,
                       const std::vector<Difference>& differences) {

@@ -31,16 +31,13 @@ const PointDifference* least_likely(const Difference& difference) {
   return found == difference.points.end() ? nullptr : &*found;
 }
 
-std::string verdict(const Difference& difference) {
-  const PointDifference* most = least_likely(difference);
-  if (most == nullptr) return difference.name + ": nothing to compare";
-  std::string words = difference.name + ": ";
-  words += difference.changed() ? text("%zu of %zu points changed", difference.changed_points(),
-                                       difference.points.size())
-                                : text("same in %zu points", difference.points.size());
-  words +=
-      text("; most at %.5g Hz, %+.4f dB ± %.2g, %+.3f° ± %.2g, p %.2g", most->frequency_hz,
-           most->gain_db, most->gain95_db, most->phase_deg, most->phase95_deg, most->probability);
+std::string line_of(const Difference& difference) {
+  std::string words = difference.name + ": " + brief_verdict(difference);
+  if (const PointDifference* most = least_likely(difference)) {
+    words +=
+        text("; most at %.5g Hz, %+.4f dB ± %.2g, %+.3f° ± %.2g, p %.2g", most->frequency_hz,
+             most->gain_db, most->gain95_db, most->phase_deg, most->phase95_deg, most->probability);
+  }
   if (difference.lost > 0) words += text("; %zu not good any more", difference.lost);
   if (difference.unmatched > 0) words += text("; %zu in one of them only", difference.unmatched);
   return words;
@@ -68,7 +65,7 @@ void print_night(std::ostream& stream, const std::string& job, const std::vector
   bool any = false;
   for (const NightRow& row : rows) {
     for (const Difference& difference : row.differences) {
-      stream << "  " << verdict(difference) << '\n';
+      stream << "  " << line_of(difference) << '\n';
       any = true;
     }
   }

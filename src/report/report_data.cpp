@@ -8,6 +8,8 @@
 
 #include "identify/transfer_function.h"
 #include "record/confidence.h"
+#include "record/text.h"
+#include "report/comparison.h"
 #include "report/model_curve.h"
 #include "report/run_summary.h"
 
@@ -19,6 +21,7 @@ using Json = nlohmann::ordered_json;
 using record::StoredPoint;
 using record::StoredResponse;
 using record::StoredRun;
+using record::text;
 
 template <typename Value>
 Json column(const std::vector<StoredPoint>& points, int digits, Value value) {
@@ -140,12 +143,7 @@ Json response_json(const StoredRun& run, const StoredResponse& response, const s
 }
 
 Json difference_json(const record::Difference& difference) {
-  Json json{{"name", difference.name},
-            {"verdict", std::to_string(difference.changed_points()) + " of " +
-                            std::to_string(difference.points.size()) + " changed" +
-                            (difference.lost > 0
-                                 ? "; " + std::to_string(difference.lost) + " not good any more"
-                                 : "")}};
+  Json json{{"name", difference.name}, {"verdict", verdict(difference)}};
   const auto add = [&](const char* key, int digits, auto value) {
     json[key] = Json::array();
     for (const record::PointDifference& point : difference.points)
@@ -161,6 +159,14 @@ Json difference_json(const record::Difference& difference) {
   for (const record::PointDifference& point : difference.points)
     json["changed"].push_back(point.changed);
   return json;
+}
+
+std::string difference_counts(const record::Difference& difference) {
+  std::string words =
+      text("%zu of %zu points changed", difference.changed_points(), difference.points.size());
+  if (difference.lost > 0) words += text(", %zu lost: not good any more", difference.lost);
+  if (difference.unmatched > 0) words += text(", %zu unmatched", difference.unmatched);
+  return words;
 }
 
 const std::vector<std::string>& notes() {
@@ -232,11 +238,10 @@ Json page_of_run(const LabelledRun& labelled) {
   Json responses = Json::array();
   for (const StoredResponse& response : run.responses)
     responses.push_back(response_json(run, response, response_name(run, response), 0));
-  const std::string outcome = run.fact("outcome");
   return {{"kind", "run"},
           {"title", labelled.label},
           {"about", about_run(run)},
-          {"outcome", outcome},
+          {"outcome", outcome_of(run)},
           {"outcome_text", outcome_text(run)},
           {"summary", summary_facts(run)},
           {"runs", Json::array({run_json(labelled)})},
@@ -258,22 +263,34 @@ Json page_of_comparison(const std::vector<LabelledRun>& runs,
       responses.push_back(response_json(runs[i].run, response, name, i));
     }
   }
-  std::size_t changed = 0;
+  bool changed = false;
+  bool scatter_known = false;
   Json differences_list = Json::array();
   Json summary = Json::array();
   for (const record::Difference& each : differences) {
-    changed += each.changed_points();
+    changed = changed || each.changed();
+    scatter_known = scatter_known || each.scatter_known();
     differences_list.push_back(difference_json(each));
-    summary.push_back(
-        {each.name, std::to_string(each.changed_points()) + " changed",
-         "of " + std::to_string(each.points.size()) + " points" +
-             (each.unmatched > 0 ? ", " + std::to_string(each.unmatched) + " unmatched" : "")});
+    summary.push_back({each.name, verdict_word(each), difference_counts(each)});
+  }
+  std::vector<std::string> labels;
+  for (const LabelledRun& run : runs) labels.push_back(run.label);
+  // As the program's exit code has it: a change comes first, then what could not be compared.
+  std::string outcome = "done";
+  std::string outcome_text = scatter_known ? "same within the scatter" : "same within tolerances";
+  if (changed) {
+    outcome = outcome_text = "changed";
+  } else if (const auto without = files_without_points(labels, differences); !without.empty()) {
+    outcome = "failed";
+    outcome_text = "nothing to compare";
+    for (std::size_t i = 0; i < without.size(); ++i)
+      outcome_text += (i == 0 ? " in " : ", ") + without[i];
   }
   return {{"kind", "compare"},
           {"title", title},
           {"about", "each later file against the first, at the frequencies that both have"},
-          {"outcome", changed == 0 ? "done" : "changed"},
-          {"outcome_text", changed == 0 ? "same within the scatter" : "changed"},
+          {"outcome", outcome},
+          {"outcome_text", outcome_text},
           {"summary", summary},
           {"runs", run_list},
           {"responses", responses},

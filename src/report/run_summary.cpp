@@ -21,15 +21,17 @@ using record::StoredPoint;
 using record::StoredRun;
 using record::text;
 
-Json points_fact(const std::vector<StoredPoint>& points) {
+Json points_fact(const std::vector<StoredPoint>& points, std::size_t planned) {
   const auto good = std::count_if(points.begin(), points.end(), [](const StoredPoint& point) {
     return point.status == "good" || point.status == "imported";
   });
   const auto others = static_cast<std::ptrdiff_t>(points.size()) - good;
+  const std::string missing =
+      points.size() < planned ? text("of %zu planned, ", planned) : std::string{};
   const std::string remark =
       others == 0 ? "all good"
                   : text("%td good, %td not", static_cast<std::ptrdiff_t>(good), others);
-  return {"Points", std::to_string(points.size()), remark};
+  return {"Points", std::to_string(points.size()), missing + remark};
 }
 
 // Nothing where every point was settled the same, usual way.
@@ -163,10 +165,14 @@ std::string about_run(const StoredRun& run) {
   return words;
 }
 
-std::string outcome_text(const StoredRun& run) {
+std::string outcome_of(const StoredRun& run) {
   const std::string outcome = run.fact("outcome");
+  return outcome.empty() && run.fact("imported_from").empty() ? "not finished" : outcome;
+}
+
+std::string outcome_text(const StoredRun& run) {
+  const std::string outcome = outcome_of(run);
   const std::string detail = run.fact("outcome_detail");
-  if (outcome.empty()) return "";
   return detail.empty() ? outcome : outcome + ": " + detail;
 }
 
@@ -177,7 +183,7 @@ Json summary_facts(const StoredRun& run) {
   };
   if (!run.responses.empty()) {
     const std::vector<StoredPoint>& points = run.responses.front().points;
-    add(points_fact(points));
+    add(points_fact(points, point_count(run.plan)));
     if (!points.empty()) {
       add({"Range", text("%.4g – %.4g Hz", points.front().frequency_hz, points.back().frequency_hz),
            ""});

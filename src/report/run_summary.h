@@ -14,7 +14,11 @@ struct LabelledRun;
 // "2026-03-01 22:14 UTC, 1000 Hz loop, virtual clock, on bench3, sinerig 0.1.0".
 std::string about_run(const record::StoredRun& run);
 
-// "done", or how it ended and why.
+// done, stopped …; "not finished" where the run was killed or goes on; empty for an import, which
+// is no run.
+std::string outcome_of(const record::StoredRun& run);
+
+// The same and why.
 std::string outcome_text(const record::StoredRun& run);
 
 // [[name, value, remark], …]: points, range, peak, intervals, bench time, loop.

@@ -50,7 +50,10 @@ void SvgPanel::range(const std::vector<double>& values, Scale scale) {
     y_.low = low / margin;
     y_.high = high * margin;
   } else {
-    const double margin = high > low ? 0.07 * (high - low) : std::max(0.1 * std::abs(high), 1e-9);
+    // A value that is constant up to rounding has a span of a few ulp: no ticks fit in there.
+    const double rounding = 1e-9 * std::max(std::abs(low), std::abs(high));
+    const double margin =
+        high > low ? std::max(0.07 * (high - low), rounding) : std::max(0.1 * std::abs(high), 1e-9);
     y_.low = low - margin;
     y_.high = high + margin;
   }

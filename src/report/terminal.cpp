@@ -8,6 +8,7 @@
 
 #include "record/text.h"
 #include "report/run_parts.h"
+#include "report/run_summary.h"
 #include "sweep/asked_frequencies.h"
 
 namespace sinerig::report {
@@ -181,10 +182,7 @@ void print_head(std::ostream& stream, const record::StoredRun& run) {
                  run.fact("clock").c_str());
   stream << text("run      %s on %s, sinerig %s\n", run.fact("started_utc").c_str(),
                  run.fact("host").c_str(), run.fact("sinerig").c_str());
-  const std::string outcome = run.fact("outcome");
-  const std::string detail = run.fact("outcome_detail");
-  stream << "outcome  " << (outcome.empty() ? "not finished" : outcome)
-         << (detail.empty() ? "" : ": " + detail) << '\n';
+  stream << "outcome  " << outcome_text(run) << '\n';
   std::uint64_t ticks = 0;
   std::uint64_t skipped = 0;
   std::int64_t max_lateness_ns = 0;

@@ -139,17 +139,12 @@ void Guard::watch_closely(std::uint32_t channel, const Sample& sample,
 void Guard::watch_motion(std::uint32_t channel, const Sample& sample, std::uint64_t tick) noexcept {
   const ChannelLimits& limits = settings_.channels[channel];
   const ChannelState& state = channels_[channel];
-  Motion& motion = motions_[channel];
+  MotionFilter& filter = motions_[channel].filter;
   const double elapsed_s = static_cast<double>(sample.time_ns - state.last_good_ns) * 1e-9;
   if (!state.seen || !(elapsed_s > 0.0)) return;
-  const double weight = elapsed_s / (limits.derivative_filter_s + elapsed_s);
-  const double velocity_before = motion.velocity;
-  const double quotient = (sample.value - state.last_value) / elapsed_s;
-  motion.velocity += weight * (quotient - motion.velocity);
-  const double acceleration = (motion.velocity - velocity_before) / elapsed_s;
-  motion.acceleration += weight * (acceleration - motion.acceleration);
-  hold(limits.velocity, std::abs(motion.velocity), TripCause::channel_velocity, channel, tick);
-  hold(limits.acceleration, std::abs(motion.acceleration), TripCause::channel_acceleration, channel,
+  filter.update(sample.value - state.last_value, elapsed_s, limits.derivative_filter_s);
+  hold(limits.velocity, std::abs(filter.velocity), TripCause::channel_velocity, channel, tick);
+  hold(limits.acceleration, std::abs(filter.acceleration), TripCause::channel_acceleration, channel,
        tick);
 }
 

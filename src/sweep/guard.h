@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "drivers/driver.h"
+#include "sweep/motion_filter.h"
 #include "sweep/nonblocking.h"
 #include "sweep/plan.h"
 #include "sweep/trip.h"
@@ -98,8 +99,7 @@ class Guard {
   };
   // What is known of a channel that is watched closely.
   struct Motion {
-    double velocity = 0.0;
-    double acceleration = 0.0;
+    MotionFilter filter;
     std::int64_t soft_error_ns = -1;  // when the following error came to exceed its bound
     std::int64_t hard_error_ns = -1;
   };

@@ -193,6 +193,11 @@ struct TickSamples {
   std::uint32_t dwell = 0;
   std::uint32_t channels = 0;
   std::array<double, max_channels> values{};
+  // A bit per channel whose value is no good sample of this tick but the one held from before.
+  std::uint32_t missing = 0;
+  std::array<std::int32_t, max_channels> offset_ns{};  // of the acquisition, after the tick's time
+
+  bool good(std::size_t channel) const { return (missing >> channel & 1U) == 0; }
 };
 
 using Record = std::variant<Point, Block, DwellTiming, Event, Preflight, Note, TickSamples, Lesson>;

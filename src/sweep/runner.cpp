@@ -200,7 +200,12 @@ void SweepRunner::exchange(double command, const Tick& tick) noexcept {
         .channels = static_cast<std::uint32_t>(first_sensor_channel + sensors_.size())};
     samples.values[command_channel] = command;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
-      samples.values[applied_channel + i] = observations_[i].value;
+      const std::size_t channel = applied_channel + i;
+      constexpr std::int64_t most_ns = INT32_MAX;
+      samples.values[channel] = observations_[i].value;
+      samples.offset_ns[channel] =
+          static_cast<std::int32_t>(std::clamp(observations_[i].offset_ns, -most_ns, most_ns));
+      if (observations_[i].missing) samples.missing |= 1U << channel;
     }
     sink_.put_sample(samples);
   }

@@ -1,8 +1,10 @@
 // The live page in a real browser: it follows a run to its end, its Stop button stops it, nothing
 // complains. The run is in virtual time and goes on when the test says so.
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <memory>
+#include <mutex>
 #include <numbers>
 
 #include <gtest/gtest.h>
@@ -30,19 +32,41 @@ class LivePage : public testing::Test {
     const auto program = test::Browser::find();
     if (!program) GTEST_SKIP() << "no Chromium here (Debian: apt install chromium)";
     play();
-    server_ = std::make_unique<Server>(Server::Settings{.address = parse_address(":0"),
+    serve(live_, ":0");
+    browser_ = std::make_unique<test::Browser>(*program);
+  }
+
+  void serve(LiveRun& run, const std::string& address) {
+    server_.reset();
+    server_ = std::make_unique<Server>(Server::Settings{.address = parse_address(address),
                                                         .token = random_token(),
                                                         .stop =
                                                             [this] {
                                                               ++stops_;
                                                             }},
-                                       live_);
-    browser_ = std::make_unique<test::Browser>(*program);
+                                       run);
   }
 
+  LiveSetup setup() {
+    LiveSetup setup = test::served_setup(plan_);
+    setup.limits = limits_;
+    setup.stop_requests = [this] {
+      const std::scoped_lock lock{silence_};
+      return stops_.load();
+    };
+    return setup;
+  }
+
+  bool wait_for_text(const std::string& id, const std::string& text) {
+    return browser_->wait_until("document.getElementById('" + id + "').textContent === '" + text +
+                                "'");
+  }
+  void press_stop() { browser_->evaluate("document.getElementById('stop').click()"); }
+
   explicit LivePage(SweepPlan plan = test::served_plan(points),
-                    sim::SimulatedRigSettings rig = test::served_rig())
-      : plan_{std::move(plan)}, rig_{std::move(rig)} {}
+                    sim::SimulatedRigSettings rig = test::served_rig(),
+                    GuardSettings limits = test::served_limits())
+      : plan_{std::move(plan)}, rig_{std::move(rig)}, limits_{std::move(limits)} {}
 
   // The whole run, its records kept to be told bit by bit.
   void play() {
@@ -85,12 +109,14 @@ class LivePage : public testing::Test {
 
   SweepPlan plan_;
   sim::SimulatedRigSettings rig_;
+  GuardSettings limits_;  // that the page shows
   Lateness lateness_;
   RunControl control_;
   RecordLog log_;
   std::size_t told_ = 0;
   std::atomic<int> stops_{0};
-  LiveRun live_{test::served_setup(plan_), lateness_};
+  std::mutex silence_;  // while it is held the server tells nothing
+  LiveRun live_{setup(), lateness_};
   std::unique_ptr<Server> server_;
   std::unique_ptr<test::Browser> browser_;
 };
@@ -149,6 +175,156 @@ TEST_F(LivePage, StopButtonStopsWithTheToken) {
   live_.finish({.outcome = "interrupted", .detail = "stop requested", .files = {"axis.sweep"}});
   EXPECT_TRUE(browser_->wait_until(
       "document.getElementById('chip').textContent === 'interrupted: stop requested'"));
+  expect_no_errors();
+}
+
+constexpr const char* stopping = "Stopping – press again for neutral at once";
+
+TEST_F(LivePage, SaysThatItStopsOnlyWhereItDoes) {
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  tell_until(2);
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('where').textContent.startsWith('3 of 30')"));
+  // The first request is refused. Until then the page only says that it asks, and its stream has
+  // left a connection for the request.
+  browser_->evaluate(
+      "EventSource.prototype.shut = EventSource.prototype.close;"
+      "EventSource.prototype.close = function() { window.closed_first = true; this.shut(); };"
+      "window.ask = window.fetch;"
+      "window.fetch = (...all) => { window.fetch = window.ask;"
+      "  window.seen = [document.getElementById('stop').textContent, window.closed_first,"
+      "                 all[1].signal instanceof AbortSignal];"
+      "  return Promise.resolve(new Response('No.', { status: 403 })); }; 0");
+  press_stop();
+  EXPECT_TRUE(wait_for_text("trouble", "Not stopped: No. Use Ctrl-C in the terminal."));
+  EXPECT_EQ(browser_->evaluate("window.seen"), nlohmann::json({"Asking …", true, true}));
+  EXPECT_TRUE(wait_for_text("stop", "Stop"));
+  EXPECT_EQ(stops_.load(), 0);
+  // The page goes on, and so does its button.
+  tell_until(5);
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('where').textContent.startsWith('6 of 30')"));
+  press_stop();
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  EXPECT_EQ(stops_.load(), 1);
+  EXPECT_TRUE(wait_for_text("trouble", ""));
+  tell_until(9);
+  EXPECT_TRUE(
+      browser_->wait_until("document.getElementById('where').textContent.startsWith('10 of 30')"));
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('.points tbody tr').length === 9"));
+  expect_no_errors();
+}
+
+// What the next press does is known to the program only: others stop the run, too.
+TEST_F(LivePage, NamesOnItsButtonWhatAnyoneHasAskedFor) {
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  EXPECT_TRUE(wait_for_text("stop", "Stop"));
+  stops_ = 1;  // another watcher, or Ctrl-C
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  browser_->open("about:blank", 900, 700);
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('stop')"));
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  press_stop();
+  EXPECT_TRUE(wait_for_text("stop", "Neutral at once"));
+  expect_no_errors();
+}
+
+TEST_F(LivePage, NoticesThatNothingIsToldAnyMore) {
+  browser_->open(server_->url(), 900, 700);
+  ASSERT_TRUE(browser_->wait_until("!!document.getElementById('chip')"));
+  EXPECT_TRUE(wait_for_text("chip", "running"));
+  {
+    const std::scoped_lock lock{silence_};
+    EXPECT_TRUE(wait_for_text("chip", "no connection"));
+    press_stop();
+    EXPECT_TRUE(wait_for_text("trouble", "No answer within 3 s. Use Ctrl-C in the terminal."));
+    EXPECT_TRUE(wait_for_text("stop", "Stop"));
+  }
+  EXPECT_TRUE(wait_for_text("chip", "running"));
+}
+
+// A run that is killed and resumed, or the next one, has the port of the one before.
+TEST_F(LivePage, DoesNotMixTwoRuns) {
+  browser_->open(server_->url(), 900, 700);
+  tell_until(5);
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('.points tbody tr').length === 5"));
+  LiveSetup next = setup();
+  next.label = "the next";
+  LiveRun other{std::move(next), lateness_};
+  const std::string place = server_->address().text();
+  serve(other, place);
+  EXPECT_TRUE(browser_->wait_until("document.querySelector('h1')?.textContent === 'the next'"));
+  EXPECT_EQ(browser_->evaluate("document.querySelectorAll('.points tbody tr').length"), 0);
+  // The token that it has was for the other run.
+  EXPECT_TRUE(browser_->evaluate("document.getElementById('stop').disabled").get<bool>());
+  // Its address with the right one, pasted over this page's, is no new page to the browser.
+  browser_->evaluate("location.href = '" + server_->url() + "'; 0");
+  EXPECT_TRUE(browser_->wait_until("document.getElementById('stop')?.disabled === false"));
+  press_stop();
+  EXPECT_TRUE(wait_for_text("stop", stopping));
+  EXPECT_EQ(stops_.load(), 1);
+  server_.reset();  // before what it tells of
+}
+
+TEST_F(LivePage, LeavesGapsWhereSamplesAreMissing) {
+  for (Record& record : log_.records) {
+    auto* samples = std::get_if<TickSamples>(&record);
+    if (samples == nullptr || samples->tick % 100 >= 20) continue;
+    for (const std::size_t channel : {command_channel, first_sensor_channel})
+      samples->values[channel] = std::nan("");
+  }
+  browser_->open(server_->url(), 1440, 1000);
+  tell_until(2);
+  EXPECT_TRUE(browser_->wait_until("!!document.querySelector('#lissajous .curve')"));
+  const auto pieces = [&](const std::string& selector) {
+    return browser_
+        ->evaluate("document.querySelector('" + selector +
+                   "').getAttribute('d').split('M').length - 1")
+        .get<int>();
+  };
+  EXPECT_GT(pieces("#lissajous .curve"), 1);
+  EXPECT_GT(pieces("#signal .command"), 1);
+  EXPECT_FALSE(
+      browser_->evaluate("document.getElementById('now').innerHTML.includes('NaN')").get<bool>());
+  expect_no_errors();
+}
+
+GuardSettings single_limits() {
+  GuardSettings limits;
+  limits.channels.resize(1);
+  limits.channels[0].max = 2.0;
+  limits.channels[0].velocity = {.soft = 900.0, .hard = 1000.0};
+  limits.channels[0].following = {.hard = 3.0};
+  limits.channels[0].following_ns = 100'000'000;
+  return limits;
+}
+
+class SingleLimitsLivePage : public LivePage {
+ protected:
+  SingleLimitsLivePage()
+      : LivePage{test::served_plan(points), test::served_rig(), single_limits()} {}
+};
+
+TEST_F(SingleLimitsLivePage, ShowsWhatIsLeftOfThem) {
+  browser_->open(server_->url(), 1440, 1000);
+  tell_until(5);
+  EXPECT_TRUE(browser_->wait_until("document.querySelectorAll('#guard tr').length === 4"));
+  const auto cell = [&](int row, int column) {
+    return browser_
+        ->evaluate("document.querySelectorAll('#guard tr')[" + std::to_string(row) + "].cells[" +
+                   std::to_string(column) + "].textContent")
+        .get<std::string>();
+  };
+  EXPECT_TRUE(cell(0, 2).ends_with(" left")) << cell(0, 2);
+  EXPECT_EQ(cell(1, 0), "gyro velocity");
+  EXPECT_TRUE(cell(1, 2).ends_with(" %")) << cell(1, 2);
+  EXPECT_EQ(cell(2, 0), "gyro velocity, soft");
+  EXPECT_EQ(cell(3, 3), "± 3.00 rad/s for 100 ms");
+  EXPECT_EQ(cell(3, 2).find('%'), std::string::npos) << cell(3, 2);
+  keep_picture("live-limits");
   expect_no_errors();
 }
 

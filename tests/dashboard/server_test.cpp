@@ -109,13 +109,41 @@ TEST_F(ServerTest, GoesOnWhereAReaderLeftOff) {
   for (std::size_t next = 0; live_.log(entries, next); entries = next) {
   }
   HttpClient client{port()};
-  client.get("/events?since=0", "Last-Event-ID: " + std::to_string(entries - 1) + "\r\n");
+  client.get("/events?since=0",
+             "Last-Event-ID: " + live_.id() + "-" + std::to_string(entries - 1) + "\r\n");
   ASSERT_TRUE(client.wait_for("event: end"));
   HttpClient ahead{port()};
   ahead.get("/events?since=99999999999999999999");
   EXPECT_TRUE(ahead.wait_for("event: status"));
   server_.reset();
-  EXPECT_THAT(client.rest(), HasSubstr("id: " + std::to_string(entries) + "\n"));
+  EXPECT_THAT(client.rest(), HasSubstr("id: " + live_.id() + "-" + std::to_string(entries) + "\n"));
+}
+
+// Whoever followed the run before on this port is not told of this one under its head.
+TEST_F(ServerTest, SendsAReaderOfAnotherRunAway) {
+  test::run_served(plan_, control_, &live_, lateness_);
+  for (const char* request : {"/events?since=0123456789abcdef-0", "/events?since=0"}) {
+    const bool foreign = std::string{request}.find('-') != std::string::npos;
+    HttpClient client{port()};
+    client.get(request, foreign ? "" : "Last-Event-ID: 0123456789abcdef-3\r\n");
+    const std::string text = client.rest();
+    EXPECT_THAT(text, HasSubstr("event: reload\n")) << request;
+    EXPECT_THAT(text, Not(HasSubstr("event: log"))) << request;
+  }
+  HttpClient own{port()};
+  own.get("/events?since=" + live_.id() + "-0");
+  EXPECT_TRUE(own.wait_for("event: log"));
+}
+
+TEST_F(ServerTest, TellsHowOftenAStopWasAskedFor) {
+  LiveSetup setup = test::served_setup(plan_);
+  setup.stop_requests = [this] {
+    return control_.stop_requests.load();
+  };
+  LiveRun run{std::move(setup), lateness_};
+  EXPECT_EQ(nlohmann::json::parse(*run.status())["stop_requests"], 0);
+  control_.stop_requests = 2;
+  EXPECT_EQ(nlohmann::json::parse(*run.status())["stop_requests"], 2);
 }
 
 std::vector<std::uint64_t> bits_of(const record::StoredRun& run) {

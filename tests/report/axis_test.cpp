@@ -1,5 +1,7 @@
 #include "report/axis.h"
 
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 namespace sinerig::report {
@@ -25,6 +27,15 @@ TEST(Axis, LabelsDecadesWithTwoAndFiveWhereThereIsRoom) {
 
 TEST(Axis, StepsEquallyInsideADecade) {
   EXPECT_EQ(log_ticks(20.0, 50.0, 3.0).major, (std::vector<double>{20.0, 30.0, 40.0, 50.0}));
+}
+
+// A step that rounding swallows must not go on for ever.
+TEST(Axis, EndsWhereTheStepIsBelowTheRounding) {
+  const double low = 1.0;
+  const double high = 1.0 + 4e-16;
+  EXPECT_LE(linear_ticks(low, high, 1e-17).major.size(), 2U);
+  EXPECT_LE(linear_ticks(0.0, 1.0, 1e-12).major.size(), 1000U);
+  EXPECT_TRUE(linear_ticks(0.0, 1.0, std::nan("")).major.empty());
 }
 
 TEST(Axis, MapsEndsToEnds) {

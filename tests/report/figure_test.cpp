@@ -1,5 +1,6 @@
 #include "report/figure.h"
 
+#include <cmath>
 #include <regex>
 #include <sstream>
 
@@ -44,6 +45,18 @@ TEST(Figure, DrawsOnePointAndNone) {
   std::ostringstream stream;
   write_bode_svg(stream, none, none.run.responses.front());
   EXPECT_EQ(occurrences(stream.str(), "nan|inf"), 0U);
+}
+
+// 6 dB, half of them a unit in the last place above.
+TEST(Figure, DrawsAGainThatIsConstantUpToRounding) {
+  LabelledRun run{.label = "flat", .run = test::two_channel_run(20)};
+  const double gain = std::pow(10.0, 6.0 / 20.0);
+  for (record::StoredPoint& point : run.run.responses.front().points)
+    point.response = point.dwell % 2 == 0 ? gain : std::nextafter(gain, 10.0);
+  std::ostringstream stream;
+  write_bode_svg(stream, run, run.run.responses.front());
+  EXPECT_EQ(occurrences(stream.str(), "nan|inf"), 0U);
+  EXPECT_LT(stream.str().size(), 100'000U);
 }
 
 TEST(Figure, BecomesAPng) {

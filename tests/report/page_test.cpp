@@ -1,4 +1,5 @@
 // The report in a real browser: it renders, its switches and cursors work, nothing complains.
+#include <complex>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -232,6 +233,18 @@ TEST_F(Page, ShowsTheLoopWithItsMarginsAndTheNotch) {
   expect_no_errors();
 }
 
+// atan2 of 0.6 k and 0.8 k is the same angle up to a unit in the last place.
+TEST_F(Page, DrawsAPhaseThatIsConstantUpToRounding) {
+  LabelledRun run = run_of(30);
+  for (record::StoredPoint& point : run.run.responses.front().points) {
+    point.response = (1.0 + point.dwell) * std::complex<double>{0.6, 0.8};
+    point.dof = 0.0;  // without an interval
+  }
+  show(run);
+  EXPECT_LT(browser_->evaluate("document.querySelectorAll('#phase text').length").get<int>(), 100);
+  expect_no_errors();
+}
+
 TEST_F(Page, FitsANarrowWindow) {
   show(run_of(40), 390, 800);
   EXPECT_LE(browser_->evaluate("document.documentElement.scrollWidth").get<int>(), 390)
@@ -249,6 +262,23 @@ TEST_F(Page, SurvivesARunWithoutPoints) {
   show(run);
   EXPECT_NE(text("main").find("No point was finished"), std::string::npos);
   show(run_of(1));
+  expect_no_errors();
+}
+
+// As after a power cut: nothing in the file says how it ended.
+TEST_F(Page, SaysThatARunWasNotFinished) {
+  LabelledRun run = run_of(12);
+  run.run.facts.erase("outcome");
+  run.run.responses.front().points.resize(7);
+  show(run);
+  EXPECT_EQ(text(".outcome"), "not finished");
+  EXPECT_TRUE(browser_->evaluate("document.querySelector('.outcome').classList.contains('bad')")
+                  .get<bool>());
+  EXPECT_NE(text(".facts").find("of 12 planned"), std::string::npos) << text(".facts");
+  // An import is no run: it has not been cut short.
+  run.run.facts["imported_from"] = "bench.csv";
+  show(run);
+  EXPECT_TRUE(browser_->evaluate("!document.querySelector('.outcome')").get<bool>());
   expect_no_errors();
 }
 

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <poll.h>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
 #include <unistd.h>
 
@@ -137,12 +138,20 @@ bool Browser::wait_until(const std::string& expression) {
       expression +
       ") done(true); else if (performance.now() > end) done(false); else setTimeout(look, 20); }; "
       "look(); })";
-  const Json answer =
-      call("Runtime.evaluate",
-           {{"expression", promise}, {"awaitPromise", true}, {"returnByValue", true}});
-  if (answer.contains("exceptionDetails"))
-    throw std::runtime_error(expression + ": " + answer["exceptionDetails"].dump());
-  return answer.at("result").value("value", false);
+  for (int loads = 0;; ++loads) {
+    try {
+      const Json answer =
+          call("Runtime.evaluate",
+               {{"expression", promise}, {"awaitPromise", true}, {"returnByValue", true}});
+      if (answer.contains("exceptionDetails"))
+        throw std::runtime_error(expression + ": " + answer["exceptionDetails"].dump());
+      return answer.at("result").value("value", false);
+    } catch (const std::runtime_error& error) {
+      // The page has loaded itself again: look at the new one.
+      const bool gone = std::string_view{error.what()}.find("navigated") != std::string_view::npos;
+      if (!gone || loads == 5) throw;
+    }
+  }
 }
 
 void Browser::mouse(const char* type, double x, double y, int buttons, int clicks) {

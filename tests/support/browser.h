@@ -30,7 +30,8 @@ class Browser {
   // The value of a JavaScript expression in the page. Throws std::runtime_error when it throws.
   nlohmann::json evaluate(const std::string& expression);
 
-  // Returns as soon as the expression is true in the page, false after half a minute.
+  // Returns as soon as the expression is true in the page, false after half a minute. The page may
+  // load itself again meanwhile.
   bool wait_until(const std::string& expression);
 
   void move_mouse(double x, double y);

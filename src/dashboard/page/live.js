@@ -1,14 +1,31 @@
 // The page of a run that goes on: the head with its Stop button, points as they come in, the end.
 
-const live = { ended: null, lost: false, stops: 0, log: false, tables: false, plan: null, drawn: -Infinity };
+const live = {
+  ended: null,
+  source: null, // of events; none while a stop is being asked for
+  place: page.id + '-0', // in the log of this run
+  heard: performance.now(),
+  lost: false,
+  asking: 0, // requests to stop without an answer yet
+  stops: 0, // that have been asked for, by whomever: what the program says
+  trouble: '',
+  log: false,
+  tables: false,
+  plan: null,
+  drawn: -Infinity,
+};
 
+const patience = 3000; // ms, for an answer and for a status, due ten times a second
+
+// A token stops one run: that of an earlier one is none.
 function takeToken() {
   const found = location.hash.match(/token=([0-9a-f]+)/);
   if (found) {
-    sessionStorage.setItem('sinerig-token', found[1]);
+    sessionStorage.setItem('sinerig-token', page.id + ' ' + found[1]);
     history.replaceState(null, '', location.pathname);
   }
-  return sessionStorage.getItem('sinerig-token');
+  const [id, token] = (sessionStorage.getItem('sinerig-token') || '').split(' ');
+  return id === page.id ? token : null;
 }
 const token = takeToken();
 
@@ -18,21 +35,38 @@ function buildHead() {
     `<div class="title"><h1>${esc(page.title)}</h1><span class="chip" id="chip">running</span><span class="grow"></span>` +
     `<button id="stop"${token ? '' : ' disabled title="Open the address that sinerig run printed to be able to stop."'}>Stop</button></div>` +
     `<p class="about">${esc(page.about)}</p>` +
-    `<div class="progress"><span id="progress"></span></div><p class="where" id="where">waiting for the first tick</p>`;
+    `<div class="progress"><span id="progress"></span></div><p class="where trouble" id="trouble" role="alert"></p><p class="where" id="where">waiting for the first tick</p>`;
   document.getElementById('stop').addEventListener('click', stopRun);
 }
 
+// The stream goes first: a browser has six connections to a place, and with as many pages open the
+// request would wait for one of them without a word.
 async function stopRun() {
-  const button = document.getElementById('stop');
-  ++live.stops;
-  button.textContent = live.stops === 1 ? 'Stopping – press again for neutral at once' : 'Neutral at once';
+  ++live.asking;
+  live.trouble = '';
+  live.source?.close();
+  live.source = null;
+  drawHead();
   try {
-    const answer = await fetch('stop', { method: 'POST', headers: { 'X-Sinerig-Token': token } });
-    if (!answer.ok) throw new Error(await answer.text());
+    const answer = await fetch('stop', {
+      method: 'POST',
+      headers: { 'X-Sinerig-Token': token },
+      signal: AbortSignal.timeout(patience),
+    });
+    if (!answer.ok) throw new Error('Not stopped: ' + (await answer.text()).trim());
+    ++live.stops;
   } catch (error) {
-    button.textContent = 'Stop';
-    document.getElementById('where').textContent = `Not stopped: ${error.message} Use Ctrl-C in the terminal.`;
+    const words = error.name === 'TimeoutError' ? `No answer within ${patience / 1000} s.` : error.message;
+    live.trouble = words + ' Use Ctrl-C in the terminal.';
   }
+  if (--live.asking === 0) follow();
+  drawHead();
+}
+
+function stopText() {
+  if (live.asking) return 'Asking …';
+  if (live.stops === 0) return 'Stop';
+  return live.stops === 1 ? 'Stopping – press again for neutral at once' : 'Neutral at once';
 }
 
 function drawHead() {
@@ -42,15 +76,18 @@ function drawHead() {
     chip.textContent = live.ended.outcome_text;
     chip.className = 'chip ' + outcomeClass(live.ended.outcome);
     document.getElementById('stop').hidden = true;
+    document.getElementById('trouble').textContent = '';
     document.getElementById('where').textContent =
       (s ? duration(s.elapsed_s) + ' of bench time; ' : '') +
       (live.ended.files.length ? 'wrote ' + live.ended.files.join(' and ') : '');
     if (live.ended.outcome === 'done') document.getElementById('progress').style.width = '100%';
     return;
   }
+  document.getElementById('stop').textContent = stopText();
+  document.getElementById('trouble').textContent = live.trouble;
   chip.textContent = live.lost ? 'no connection' : 'running';
   chip.className = 'chip ' + (live.lost ? 'bad' : 'running');
-  if (!s || live.stops) return;
+  if (!s) return;
   document.getElementById('progress').style.width = (100 * s.done).toFixed(2) + '%';
   document.getElementById('where').innerHTML =
     placeText(s) +
@@ -174,19 +211,24 @@ function schedule() {
   if (live.plan === null) live.plan = requestAnimationFrame(draw);
 }
 
+function heard() {
+  live.heard = performance.now();
+  live.lost = false;
+  schedule();
+}
+
 function follow() {
-  const source = new EventSource('events?since=0');
-  source.addEventListener('open', () => {
-    live.lost = false;
-    schedule();
-  });
+  if (live.ended) return;
+  const source = (live.source = new EventSource('events?since=' + live.place));
   source.addEventListener('log', event => {
+    live.place = event.lastEventId;
     takeLog(JSON.parse(event.data));
-    schedule();
+    heard();
   });
   source.addEventListener('status', event => {
     now.status = JSON.parse(event.data);
-    schedule();
+    live.stops = now.status.stop_requests;
+    heard();
   });
   source.addEventListener('end', event => {
     source.close();
@@ -194,10 +236,22 @@ function follow() {
     page.outcome = live.ended.outcome;
     schedule();
   });
+  // Another run has taken the place of this one.
+  source.addEventListener('reload', () => {
+    source.close();
+    location.reload();
+  });
   source.addEventListener('error', () => {
     live.lost = true;
     schedule();
   });
+}
+
+// A connection that says nothing breaks without an error.
+function watch() {
+  if (live.ended || live.lost || performance.now() - live.heard < patience) return;
+  live.lost = true;
+  schedule();
 }
 
 function buildLive() {
@@ -218,6 +272,9 @@ function buildLive() {
     drawNow();
   });
   follow();
+  setInterval(watch, 250);
+  // The address of another run, token and all, pasted over this one's loads nothing by itself.
+  addEventListener('hashchange', () => location.reload());
 }
 
 buildLive();

@@ -79,7 +79,7 @@ function drawSignal() {
     const channel = page.channels[i];
     html += `<path class="minor" d="M${nowMargin.left} ${top + lane}H${width - nowMargin.right}"/>`;
     if (i === 1)
-      html += `<path class="curve quiet command" d="${curvePath(trace.channels[0].map((v, k) => x(k)), trace.channels[0].map(y))}"/>`;
+      html += `<path class="curve quiet command" d="${curvePath(trace.channels[0].map((v, k) => x(k)), trace.channels[0].map(v => (v === null ? null : y(v))))}"/>`;
     const style = i === 1 ? '--c:var(--soft)' : `--c:var(--s${(i - 2) % 6})`;
     html += `<g style="${style}"><path class="curve" d="${curvePath(values.map((v, k) => x(k)), values.map(v => (v === null ? null : y(v))))}"/></g>`;
     html += `<text x="${nowMargin.left}" y="${top + 9}"><tspan class="strong">${esc(channel.name)}</tspan> ${values.length ? `${significant(lo, 4)} to ${significant(hi, 4)} ${esc(channel.unit)}` : ''}</text>`;
@@ -109,13 +109,15 @@ function drawLissajous() {
     [y0, y1] = span(ys);
   const x = linearScale(x0, x1, left + 6, left + size - 6),
     y = linearScale(y0, y1, top + size - 6, top + 6);
-  const last = Math.min(xs.length, ys.length) - 1;
+  // A sample that either lacks is a gap, not a point on an axis.
+  const both = xs.map((v, i) => i < ys.length && v !== null && ys[i] !== null),
+    last = both.lastIndexOf(true);
   const style = `--c:var(--s${Math.max(0, index) % 6})`;
   box.innerHTML =
     `<svg height="${height}" viewBox="0 0 ${width} ${height}"><rect class="frame" x="${left + 0.5}" y="${top + 0.5}" width="${size - 1}" height="${size - 1}"/>` +
     `<path class="minor" d="M${left} ${top + size / 2}h${size}M${left + size / 2} ${top}v${size}"/>` +
     (last > 0
-      ? `<g style="${style}"><path class="curve" d="${curvePath(xs.map(x), ys.map(y))}"/><circle class="head" cx="${x(xs[last]).toFixed(1)}" cy="${y(ys[last]).toFixed(1)}" r="4"/></g>`
+      ? `<g style="${style}"><path class="curve" d="${curvePath(xs.map(x), xs.map((v, i) => (both[i] ? y(ys[i]) : null)))}"/><circle class="head" cx="${x(xs[last]).toFixed(1)}" cy="${y(ys[last]).toFixed(1)}" r="4"/></g>`
       : '') +
     `<text x="${left + size / 2}" y="${top + size + 16}" text-anchor="middle">${esc(page.channels[input].name)}</text>` +
     `<text transform="translate(${left - 8} ${top + size / 2}) rotate(-90)" text-anchor="middle">${esc(page.channels[output].name)}</text></svg>`;
@@ -144,8 +146,11 @@ function estimateRow(estimate, r, tone) {
   return `<tr><td>${name}</td><td class="n">${gain}</td><td class="n">${phase}</td></tr>`;
 }
 
+// Where a part of the limits would tell nothing (there is one only, or what lasts too short does not
+// count) it is the distance that is left.
 function guardRow(row) {
   const used = row.used === null ? null : Math.max(0, row.used);
+  const room = row.lasting_s > 0 ? `${significant(Math.max(row.high, -row.low), 3)}` : `${significant(row.left, 3)} left`;
   const level = used === null ? '' : used > 0.9 ? 'bad' : used > 0.7 ? 'warn' : 'good';
   const limits =
     row.min !== null && row.max !== null
@@ -157,7 +162,8 @@ function guardRow(row) {
         : `≥ ${significant(row.min, 3)}`;
   return (
     `<tr><td>${esc(row.name)}</td><td class="meter"><span class="${level}" style="width:${used === null ? 0 : Math.min(100, 100 * used).toFixed(1)}%"></span></td>` +
-    `<td class="n">${used === null ? '–' : Math.round(100 * used) + ' %'}</td><td class="plain">${limits} ${esc(row.unit)}</td></tr>`
+    `<td class="n">${used !== null ? Math.round(100 * used) + ' %' : row.left === null ? '–' : room}</td>` +
+    `<td class="plain">${limits} ${esc(row.unit)}${row.lasting_s > 0 ? ' for ' + seconds(row.lasting_s) : ''}</td></tr>`
   );
 }
 
@@ -182,7 +188,7 @@ function drawState() {
         : '') + lastText();
   document.getElementById('guard').innerHTML = s.headroom.length
     ? `<table>${s.headroom.map(guardRow).join('')}</table>`
-    : '<p class="plain">this rig file sets no limits</p>';
+    : '<p class="plain">no limits of values in this rig file; ages, codes and lateness are watched without a meter</p>';
   document.getElementById('loop').innerHTML = page.real_time
     ? `<p><b id="late">${significant(s.late_us, 3)} µs</b> late, at most <b>${significant(s.late_max_us, 3)} µs</b> <span class="plain">of ${significant(1e6 / page.runs[0].rate_hz, 4)} µs</span>, <b>${s.skipped}</b> skipped</p>`
     : `<p>virtual clock: as fast as the machine goes, <b>${s.skipped}</b> skipped</p>`;

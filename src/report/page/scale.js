@@ -27,9 +27,18 @@ function angleStep(spanDeg, count) {
     : angleSteps.find(step => spanDeg / step <= count) || niceStep(spanDeg, count);
 }
 
+const mostTicks = 1000; // far above what any plot has room for
+
 function linearTicks(lo, hi, step) {
-  const ticks = [];
-  for (let i = Math.ceil(lo / step - 1e-9); i * step <= hi + step * 1e-9; ++i) ticks.push(i * step);
+  const ticks = [],
+    first = Math.ceil(lo / step - 1e-9);
+  for (let i = 0; i < mostTicks; ++i) {
+    const value = (first + i) * step;
+    if (!(value <= hi + step * 1e-9)) break;
+    // Where the step is below the rounding of the values the next tick is this one again.
+    if (ticks.length && !(value > ticks.at(-1))) break;
+    ticks.push(value);
+  }
   return ticks;
 }
 
@@ -95,6 +104,9 @@ function extent(values, log) {
   }
   if (lo > hi) return log ? [1, 10] : [-1, 1];
   if (log) return hi / lo < 1.5 ? [lo / 1.6, hi * 1.6] : [lo / (hi / lo) ** 0.06, hi * (hi / lo) ** 0.06];
-  const margin = hi > lo ? (hi - lo) * 0.07 : Math.max(Math.abs(hi) * 0.1, 1e-9);
+  // A value that is constant up to rounding has a span of a few ulp: no ticks fit in there.
+  const rounding = 1e-9 * Math.max(Math.abs(lo), Math.abs(hi));
+  const margin =
+    hi > lo ? Math.max((hi - lo) * 0.07, rounding) : Math.max(Math.abs(hi) * 0.1, 1e-9);
   return [lo - margin, hi + margin];
 }
