@@ -251,11 +251,11 @@ TEST_F(Formats, UffHoldsTenDigitsOfAFrequency) {
     double frequency_hz;
     double error;
   };
-  const std::vector<Case> cases{{1.23456789012345e-4, 5e-9},  {9.87654321098765e-4, 5e-9},
-                                {1.00000000012345e-3, 5e-10}, {1.23456789012345e-2, 5e-10},
-                                {0.0999999999987654, 5e-10},  {0.123456789012345, 5e-10},
-                                {9.99999999987654, 5e-10},    {1234.56789012345, 5e-10},
-                                {98765432.1098765, 5e-10},    {9876543210.98765, 5e-10}};
+  const std::vector<Case> cases{{1.0000000449e-4, 5e-9},     {9.87654321098765e-4, 5e-9},
+                                {1.00000000449e-3, 5e-10},   {1.00000000449e-2, 5e-10},
+                                {0.0999999999987654, 5e-10}, {0.123456789012345, 5e-10},
+                                {9.99999999987654, 5e-10},   {1234.56789012345, 5e-10},
+                                {98765432.1098765, 5e-10},   {9876543210.98765, 5e-10}};
   auto& points = run_.responses[1].points;
   points.resize(cases.size());
   for (std::size_t i = 0; i < cases.size(); ++i) points[i].frequency_hz = cases[i].frequency_hz;

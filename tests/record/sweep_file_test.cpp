@@ -211,45 +211,61 @@ TEST_F(SweepFile, GivesEveryFigureOfAPointBack) {
   EXPECT_EQ(back.settled_by, wanted.settled_by);
 }
 
-// While a reader is between two tables: what another process may do at any time.
-class Meanwhile {
+// What another process may do at any time, once: before a reader begins with a statement.
+class BeforeStatement {
  public:
-  // Before the first statement of a reader that begins with `statement`; where that is empty, when
-  // the file is about to be opened.
-  Meanwhile(std::string statement, std::function<void()> action)
+  BeforeStatement(std::string statement, std::function<void()> action)
       : statement_{std::move(statement)}, action_{std::move(action)} {
     current = this;
     sqlite3_auto_extension(reinterpret_cast<void (*)()>(opened));
   }
-  ~Meanwhile() {
-    sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(opened));
-    current = nullptr;
-  }
+  ~BeforeStatement() { sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(opened)); }
 
   bool happened() const { return !action_; }
 
  private:
   static int opened(sqlite3* database, const char**, const void*) {
-    if (current->statement_.empty()) {
-      current->act();
-    } else {
-      sqlite3_trace_v2(database, SQLITE_TRACE_STMT, begun, current);
-    }
+    sqlite3_trace_v2(database, SQLITE_TRACE_STMT, begun, current);
     return SQLITE_OK;
   }
   static int begun(unsigned, void* self, void*, void* sql) {
-    auto* meanwhile = static_cast<Meanwhile*>(self);
-    if (std::string{static_cast<const char*>(sql)}.rfind(meanwhile->statement_, 0) == 0)
-      meanwhile->act();
+    auto& before = *static_cast<BeforeStatement*>(self);
+    const bool awaited =
+        std::string{static_cast<const char*>(sql)}.rfind(before.statement_, 0) == 0;
+    if (awaited && before.action_) std::exchange(before.action_, {})();
     return 0;
   }
-  void act() {
-    if (const auto action = std::exchange(action_, {})) action();
-  }
 
-  static inline Meanwhile* current = nullptr;
+  static inline BeforeStatement* current = nullptr;
   std::string statement_;
   std::function<void()> action_;
+};
+
+// The same, before a database is opened.
+class BeforeOpening {
+ public:
+  explicit BeforeOpening(std::function<void()> action) {
+    action_ = std::move(action);
+    system_ = sqlite3_vfs_find(nullptr);
+    files_ = *system_;
+    files_.zName = "before_opening";
+    files_.xOpen = [](sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* used) {
+      if (action_) std::exchange(action_, {})();
+      return system_->xOpen(system_, name, file, flags, used);
+    };
+    sqlite3_vfs_register(&files_, 1);
+  }
+  ~BeforeOpening() {
+    sqlite3_vfs_unregister(&files_);
+    sqlite3_vfs_register(system_, 1);
+  }
+
+  static bool happened() { return !action_; }
+
+ private:
+  static inline std::function<void()> action_;
+  static inline sqlite3_vfs* system_ = nullptr;
+  sqlite3_vfs files_{};
 };
 
 TEST_F(SweepFile, IsReadAsItWasAtOneMomentWhileItIsWritten) {
@@ -257,10 +273,10 @@ TEST_F(SweepFile, IsReadAsItWasAtOneMomentWhileItIsWritten) {
   info.plan.refinement.candidates = {info.plan.dwells.back()};
   SweepWriter writer{path(), info, SweepWriter::IfExists::refuse};
   writer.begin_part({});
-  const Meanwhile meanwhile{"SELECT dwell, cycles", [&] {
-                              writer.write(Event{.kind = EventKind::refined, .dwell = 3});
-                              writer.commit();
-                            }};
+  const BeforeStatement meanwhile{"SELECT dwell, cycles", [&] {
+                                    writer.write(Event{.kind = EventKind::refined, .dwell = 3});
+                                    writer.commit();
+                                  }};
   const StoredRun run = read_sweep(path());
   EXPECT_TRUE(meanwhile.happened());
   EXPECT_EQ(run.plan.dwells.size(), 3U);
@@ -289,7 +305,7 @@ TEST_F(SweepFile, IsThatOfOneOfTwoWhoWantTheSameName) {
       ++refused;
     }
   };
-  const Meanwhile meanwhile{"", write};
+  const BeforeOpening meanwhile{write};
   write();
   EXPECT_TRUE(meanwhile.happened());
   EXPECT_EQ(written, 1);
@@ -301,6 +317,8 @@ TEST_F(SweepFile, IsClaimedByOne) {
   const auto mine = FileLock::claim(path());
   ASSERT_NE(mine, nullptr);
   EXPECT_EQ(FileLock::claim(path()), nullptr);
+  write_and_finish(path("finished.sweep"));
+  EXPECT_EQ(FileLock::claim(path("finished.sweep")), nullptr);
   EXPECT_THROW((FileLock{path(), "in use"}), FileInUse);
 }
 
