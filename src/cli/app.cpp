@@ -1,6 +1,9 @@
 #include "cli/app.h"
 
+#include <cstdio>
 #include <iostream>
+#include <poll.h>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <spdlog/cfg/env.h>
@@ -112,9 +115,21 @@ void set_up_logging(const std::string& level) {
   if (!level.empty()) spdlog::set_level(spdlog::level::from_str(level));
 }
 
-}  // namespace
+bool reader_has_gone() {
+  pollfd output{.fd = STDOUT_FILENO, .events = POLLOUT, .revents = 0};
+  return poll(&output, 1, 0) == 1 && (output.revents & POLLERR) != 0;
+}
 
-int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
+// What was printed may still wait in a buffer, or be lost with a full disk: whoever reads the exit
+// code would take half a table for a whole one. A reader that has gone wanted no more.
+int checked_output(int exit_code) {
+  const bool flushed = std::cout.flush().good() && std::fflush(stdout) == 0;
+  if ((flushed && std::ferror(stdout) == 0) || reader_has_gone()) return exit_code;
+  spdlog::error("standard output cannot be written: what was printed is lost, or a part of it");
+  return exit_code == exit_done ? static_cast<int>(exit_failed) : exit_code;
+}
+
+int run_command_line(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   CLI::App app{description, "sinerig"};
   app.footer(footer);
   app.set_version_flag("--version", std::string{"sinerig "} + version);
@@ -164,7 +179,9 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   try {
     app.parse(arguments_of(argc, argv));
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? exit_done : exit_usage;
+    const int exit_code = app.exit(error) == 0 ? exit_done : exit_usage;
+    set_up_logging({});
+    return exit_code;
   }
   set_up_logging(log_level);
   const bool hushed = run_options.voice != Voice::text || night_options.voice != Voice::text ||
@@ -214,6 +231,12 @@ int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
     return exit_failed;
   }
   return exit_usage;
+}
+
+}  // namespace
+
+int run_app(int argc, char** argv, const std::vector<DriverKit>& drivers) {
+  return checked_output(run_command_line(argc, argv, drivers));
 }
 
 }  // namespace sinerig::cli

@@ -45,6 +45,18 @@ void warn_of_lost_status(const std::vector<const StoredResponse*>& responses) {
   }
 }
 
+void leave_out_empty(std::vector<const StoredResponse*>& responses, const StoredRun& run,
+                     const std::string& file) {
+  std::erase_if(responses, [&](const StoredResponse* response) {
+    if (record::fits_uff58(*response)) return false;
+    spdlog::warn("{} has no point with a response; left out",
+                 run.channels.at(response->output).name);
+    return true;
+  });
+  if (responses.empty())
+    throw record::SweepFileError(file + ": has no point with a response, nothing to write");
+}
+
 void write_snippet(std::ostream& stream, const StoredRun& run, const ExportOptions& options) {
   const StoredResponse& response = chosen_response(run, options.file, options.channel);
   const std::string source = fs::path{options.file}.filename().string();
@@ -59,7 +71,8 @@ void export_to(std::ostream& stream, const StoredRun& run, const ExportOptions& 
   if (options.format == "json") {
     record::write_json(stream, run);
   } else if (options.format == "uff") {
-    const auto responses = chosen_responses(run, options);
+    auto responses = chosen_responses(run, options);
+    leave_out_empty(responses, run, options.file);
     warn_of_lost_status(responses);
     record::write_uff58(stream, run, responses, fs::path{options.file}.stem().string());
   } else if (options.format == "snippet") {

@@ -10,6 +10,7 @@
 
 #include "record/csv_text.h"
 #include "record/point_columns.h"
+#include "record/utf8.h"
 
 namespace sinerig::record {
 
@@ -20,13 +21,7 @@ constexpr double radians_per_degree = std::numbers::pi / 180.0;
 // "# output: encoder [rad]" → {encoder, rad}.
 bool read_channel(const std::string& remark, const std::string& key, ChannelInfo& channel) {
   if (remark.rfind(key, 0) != 0) return false;
-  const std::string rest = trimmed_field(remark.substr(key.size()));
-  const std::size_t open = rest.rfind('[');
-  if (open == std::string::npos || rest.back() != ']') {
-    channel = {rest, ""};
-  } else {
-    channel = {trimmed_field(rest.substr(0, open)), rest.substr(open + 1, rest.size() - open - 2)};
-  }
+  channel = channel_from_text(remark.substr(key.size()));
   return true;
 }
 
@@ -127,7 +122,7 @@ ImportedResponse read_csv(const std::string& path) {
       throw SweepFileError(place + ": holds binary data; wanted text");
     // The quotes of a line are those of its fields.
     const std::size_t content = line.find_first_not_of(" \t\r\f\v");
-    line = content == std::string::npos ? std::string{} : line.substr(content);
+    line = content == std::string::npos ? std::string{} : as_utf8(line.substr(content));
     if (line.empty()) continue;
     if (line.front() == '#') {
       const std::string remark = trimmed_field(line.substr(1));
@@ -152,8 +147,6 @@ ImportedResponse read_csv(const std::string& path) {
       if (row.has("output")) response.output = {row.text("output"), row.text("output_unit")};
     }
     response.points.push_back(point_of(row));
-    if (!(response.points.back().frequency_hz > 0.0))
-      throw SweepFileError(place + ": the frequency has to be above zero");
   }
   if (response.points.empty()) throw SweepFileError(path + ": holds no point");
   return response;

@@ -51,6 +51,20 @@ std::int64_t Database::pragma(const std::string& name) {
   return statement.step() ? statement.integer(0) : 0;
 }
 
+bool Database::has_table(const std::string& name) {
+  Statement found{*this, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?"};
+  found.bind(name);
+  return found.step();
+}
+
+std::vector<std::string> Database::columns_of(const std::string& table) {
+  Statement rows{*this, "SELECT name FROM pragma_table_info(?)"};
+  rows.bind(table);
+  std::vector<std::string> names;
+  while (rows.step()) names.push_back(rows.text(0));
+  return names;
+}
+
 Statement::Statement(Database& database, std::string_view sql) : database_{database} {
   const int code = sqlite3_prepare_v2(database.handle(), sql.data(), static_cast<int>(sql.size()),
                                       &handle_, nullptr);

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <vector>
 
 struct sqlite3;
 struct sqlite3_stmt;
@@ -85,6 +86,8 @@ class Database {
 
   void execute(const std::string& sql);  // any number of statements, no results
   std::int64_t pragma(const std::string& name);
+  bool has_table(const std::string& name);
+  std::vector<std::string> columns_of(const std::string& table);  // none where there is no table
   bool in_transaction() const;
 
   sqlite3* handle() const { return handle_; }

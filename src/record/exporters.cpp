@@ -206,7 +206,8 @@ void write_json(std::ostream& stream, const StoredRun& run) {
                          {"events", events_json(run)},
                          {"parts", parts_json(run)},
                          {"timing", timing_json(run)}};
-  stream << document.dump(1) << '\n';
+  // What is no UTF-8 is replaced: a name that cannot be printed is worth no refusal.
+  stream << document.dump(1, ' ', false, Json::error_handler_t::replace) << '\n';
 }
 
 }  // namespace sinerig::record

@@ -1,6 +1,7 @@
 // One writer at a time, whatever becomes of it: the kernel lets go of the lock with the process.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "record/database.h"
@@ -20,17 +21,24 @@ inline constexpr const char* file_in_use =
 class FileLock {
  public:
   // Locks one byte far beyond the contents of an existing file, out of the way of SQLite's own
-  // locks. Throws FileInUse with `who` in it where somebody has it, SweepFileError where the file
-  // cannot be opened for writing.
+  // locks. Throws FileInUse with `who` in it where somebody has it or is just putting another file
+  // in its place, SweepFileError where the file cannot be opened for writing.
   //
   // As POSIX has it, closing the file also drops the locks of other handles of this process on it:
   // a lock has to outlive the database that it guards.
   FileLock(const std::string& path, const std::string& who);
   ~FileLock();
+
+  // Makes the file, empty and locked: of several who want the same name one has it. Nothing where
+  // there is such a file, or somebody was faster. Throws SweepFileError where none can be made.
+  static std::unique_ptr<FileLock> claim(const std::string& path);
+
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
 
  private:
+  explicit FileLock(int descriptor) : descriptor_{descriptor} {}
+
   int descriptor_ = -1;
 };
 

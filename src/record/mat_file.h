@@ -13,7 +13,7 @@ namespace sinerig::record {
 // (ny×nu×nf×2×2: var re, cov; cov, var im), InputName, OutputName, InputUnit, OutputUnit (cells),
 // Ts; then the figures of each point under their names in the CSV and status, reason (ny×nu×nf).
 // NaN where a pair was not measured. Throws SweepFileError when the responses do not share their
-// frequencies, or the file cannot be written.
+// frequencies, or the file cannot be written in full: what was there before then is still there.
 void write_mat(const std::string& path, const StoredRun& run,
                const std::vector<const StoredResponse*>& responses);
 

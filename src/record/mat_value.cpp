@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <cstring>
+
+#include "record/utf8.h"
 
 namespace sinerig::record {
 
@@ -80,6 +83,13 @@ MatValue made(const std::string& name, matio_classes kind, matio_types type, Dim
                                 const_cast<void*>(data), options)};
 }
 
+// Unlike ==, takes NaN for NaN.
+bool same_bits(const std::vector<std::complex<double>>& a,
+               const std::vector<std::complex<double>>& b) {
+  return a.size() == b.size() &&
+         (a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(a.front())) == 0);
+}
+
 }  // namespace
 
 MatValue mat_array(const std::string& name, const Dimensions& dimensions,
@@ -144,7 +154,7 @@ std::string text_value(const matvar_t* value) {
   }
   const auto* bytes = static_cast<const char*>(value->data);
   text.assign(bytes, bytes + std::min(count, value->nbytes));
-  return text;
+  return as_utf8(text);
 }
 
 std::vector<std::string> text_values(const matvar_t* value) {
@@ -155,6 +165,12 @@ std::vector<std::string> text_values(const matvar_t* value) {
   auto* const* cells = static_cast<matvar_t* const*>(value->data);
   for (std::size_t i = 0; i < element_count(value); ++i) texts.push_back(text_value(cells[i]));
   return texts;
+}
+
+bool same_value(const matvar_t& a, const matvar_t& b) {
+  return a.name != nullptr && b.name != nullptr && std::strcmp(a.name, b.name) == 0 &&
+         a.class_type == b.class_type && same_bits(complex_values(&a), complex_values(&b)) &&
+         text_values(&a) == text_values(&b);
 }
 
 }  // namespace sinerig::record

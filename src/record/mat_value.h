@@ -32,4 +32,7 @@ std::vector<double> real_values(const matvar_t* value);
 std::string text_value(const matvar_t* value);
 std::vector<std::string> text_values(const matvar_t* value);  // a cell, or one text
 
+// The same name, and to the last bit the same numbers or texts.
+bool same_value(const matvar_t& a, const matvar_t& b);
+
 }  // namespace sinerig::record

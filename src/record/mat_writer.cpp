@@ -1,9 +1,12 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
 #include <limits>
 
 #include "record/mat_file.h"
 #include "record/mat_value.h"
+#include "record/part_file.h"
 #include "record/point_columns.h"
 #include "version.h"
 
@@ -90,18 +93,20 @@ void refuse_different_grids(const std::string& path,
                        "hold them; export them one by one with --channel");
 }
 
-void write_channels(mat_t* file, const StoredRun& run, const Grid& grid) {
-  const auto write = [&](const char* name, const std::vector<std::uint32_t>& channels,
-                         std::string ChannelInfo::*part) {
+using Variables = std::vector<MatValue>;
+
+void add_channels(Variables& variables, const StoredRun& run, const Grid& grid) {
+  const auto add = [&](const char* name, const std::vector<std::uint32_t>& channels,
+                       std::string ChannelInfo::*part) {
     std::vector<std::string> texts;
     texts.reserve(channels.size());
     for (const std::uint32_t channel : channels) texts.push_back(run.channels.at(channel).*part);
-    Mat_VarWrite(file, mat_texts(name, {channels.size(), 1}, texts).get(), MAT_COMPRESSION_NONE);
+    variables.push_back(mat_texts(name, {channels.size(), 1}, texts));
   };
-  write("OutputName", grid.outputs(), &ChannelInfo::name);
-  write("OutputUnit", grid.outputs(), &ChannelInfo::unit);
-  write("InputName", grid.inputs(), &ChannelInfo::name);
-  write("InputUnit", grid.inputs(), &ChannelInfo::unit);
+  add("OutputName", grid.outputs(), &ChannelInfo::name);
+  add("OutputUnit", grid.outputs(), &ChannelInfo::unit);
+  add("InputName", grid.inputs(), &ChannelInfo::name);
+  add("InputUnit", grid.inputs(), &ChannelInfo::unit);
 }
 
 std::vector<double> covariance_data(const Grid& grid) {
@@ -115,21 +120,8 @@ std::vector<double> covariance_data(const Grid& grid) {
   return all;
 }
 
-}  // namespace
-
-void write_mat(const std::string& path, const StoredRun& run,
-               const std::vector<const StoredResponse*>& responses) {
-  refuse_different_grids(path, responses);
+Variables variables_of(const StoredRun& run, const std::vector<const StoredResponse*>& responses) {
   const Grid grid{responses};
-  const std::string remark = std::string{"MATLAB 5.0 MAT-file, sinerig "} + version;
-  const MatFile file{Mat_CreateVer(path.c_str(), remark.c_str(), MAT_FT_MAT5)};
-  if (file == nullptr) throw SweepFileError(path + ": cannot be written");
-  bool written = true;
-  const auto write = [&](const MatValue& value) {
-    written = written && value != nullptr &&
-              Mat_VarWrite(file.get(), value.get(), MAT_COMPRESSION_NONE) == 0;
-  };
-
   std::vector<std::complex<double>> response;
   for (const StoredPoint* point : grid.points())
     response.push_back(point == nullptr ? std::complex<double>{nan_value, nan_value}
@@ -140,22 +132,79 @@ void write_mat(const std::string& path, const StoredRun& run,
   Dimensions with_covariance = grid.dimensions();
   with_covariance.insert(with_covariance.end(), {2, 2});
 
-  write(mat_array("ResponseData", grid.dimensions(), response));
-  write(mat_array("Frequency", {frequency.size(), 1}, frequency));
-  write(mat_text("FrequencyUnit", "Hz"));
-  write(mat_array("CovarianceData", with_covariance, covariance_data(grid)));
-  write(mat_array("HoldRate", {grid.outputs().size(), grid.inputs().size()}, grid.hold_rates()));
-  write(mat_array("Ts", {1, 1}, std::vector<double>{0.0}));
-  write_channels(file.get(), run, grid);
+  Variables all;
+  all.push_back(mat_array("ResponseData", grid.dimensions(), response));
+  all.push_back(mat_array("Frequency", {frequency.size(), 1}, frequency));
+  all.push_back(mat_text("FrequencyUnit", "Hz"));
+  all.push_back(mat_array("CovarianceData", with_covariance, covariance_data(grid)));
+  all.push_back(
+      mat_array("HoldRate", {grid.outputs().size(), grid.inputs().size()}, grid.hold_rates()));
+  all.push_back(mat_array("Ts", {1, 1}, std::vector<double>{0.0}));
+  add_channels(all, run, grid);
   for (const PointColumn& column : point_columns) {
-    write(mat_array(column.name, grid.dimensions(),
-                    grid.numbers([&](const StoredPoint& point) { return point.*column.value; })));
+    all.push_back(
+        mat_array(column.name, grid.dimensions(),
+                  grid.numbers([&](const StoredPoint& point) { return point.*column.value; })));
   }
-  write(mat_texts("status", grid.dimensions(), grid.texts(&StoredPoint::status)));
-  write(mat_texts("reason", grid.dimensions(), grid.texts(&StoredPoint::reason)));
-  write(mat_texts("settled_by", grid.dimensions(), grid.texts(&StoredPoint::settled_by)));
-  write(mat_text("Notes", response_convention));
-  if (!written) throw SweepFileError(path + ": cannot be written");
+  all.push_back(mat_texts("status", grid.dimensions(), grid.texts(&StoredPoint::status)));
+  all.push_back(mat_texts("reason", grid.dimensions(), grid.texts(&StoredPoint::reason)));
+  all.push_back(mat_texts("settled_by", grid.dimensions(), grid.texts(&StoredPoint::settled_by)));
+  all.push_back(mat_text("Notes", response_convention));
+  return all;
+}
+
+bool write_all(const std::string& path, const Variables& variables) {
+  const std::string remark = std::string{"MATLAB 5.0 MAT-file, sinerig "} + version;
+  MatFile file{Mat_CreateVer(path.c_str(), remark.c_str(), MAT_FT_MAT5)};
+  if (file == nullptr) return false;
+  const bool written = std::all_of(variables.begin(), variables.end(), [&](const MatValue& each) {
+    return each != nullptr && Mat_VarWrite(file.get(), each.get(), MAT_COMPRESSION_NONE) == 0;
+  });
+  return Mat_Close(file.release()) == 0 && written;
+}
+
+// Its elements, of which each says at its head how long it is, fill the file to its end.
+bool is_complete(const std::string& path) {
+  constexpr std::uintmax_t header = 128;
+  struct Tag {
+    std::uint32_t type;
+    std::uint32_t bytes;
+  };
+  std::ifstream stream{path, std::ios::binary | std::ios::ate};
+  const auto size = static_cast<std::uintmax_t>(stream.tellg());
+  std::uintmax_t at = header;
+  while (stream && at < size) {
+    Tag tag{};
+    stream.seekg(static_cast<std::streamoff>(at));
+    stream.read(reinterpret_cast<char*>(&tag), sizeof tag);
+    at += sizeof tag + tag.bytes;
+  }
+  return stream && at == size;
+}
+
+// matio says nothing of what a full disk did not take: whole is what can be read again.
+bool holds_all(const std::string& path, const Variables& variables) {
+  const MatFile file{Mat_Open(path.c_str(), MAT_ACC_RDONLY)};
+  return file != nullptr && is_complete(path) &&
+         std::all_of(variables.begin(), variables.end(), [&](const MatValue& each) {
+           const MatValue back{Mat_VarReadNext(file.get())};
+           return back != nullptr && same_value(*back, *each);
+         });
+}
+
+}  // namespace
+
+void write_mat(const std::string& path, const StoredRun& run,
+               const std::vector<const StoredResponse*>& responses) {
+  refuse_different_grids(path, responses);
+  const Variables variables = variables_of(run, responses);
+  PartFile part{path};
+  if (!write_all(part.path(), variables) || !holds_all(part.path(), variables)) {
+    throw SweepFileError(path +
+                         ": cannot be written, or not in full: is there room on the disk, and may "
+                         "the folder be written to?");
+  }
+  part.take_its_place();
 }
 
 }  // namespace sinerig::record

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "record/csv_reader.h"
+#include "record/csv_text.h"
 #include "record/mat_file.h"
 #include "record/uff58.h"
 
@@ -64,6 +65,18 @@ StoredPoint imported_point() {
     point.*member = nan_value;
   point.status = "imported";
   return point;
+}
+
+ChannelInfo channel_from_text(const std::string& text) {
+  const std::string all = trimmed_field(text);
+  if (all.empty() || all.back() != ']') return {all, ""};
+  int depth = 0;
+  for (std::size_t open = all.size(); open-- > 0;) {
+    depth += all[open] == ']' ? 1 : all[open] == '[' ? -1 : 0;
+    if (depth == 0)
+      return {trimmed_field(all.substr(0, open)), all.substr(open + 1, all.size() - open - 2)};
+  }
+  return {all, ""};
 }
 
 std::vector<ImportedResponse> import_responses(const std::string& path) {

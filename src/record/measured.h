@@ -26,6 +26,9 @@ inline constexpr const char* left_out_fact = "left_out";
 // A point with nothing in it yet.
 StoredPoint imported_point();
 
+// "NAME [UNIT]"; the brackets of a unit may hold others, as in V [rms]. Without them all is name.
+ChannelInfo channel_from_text(const std::string& text);
+
 // By extension: .csv or .txt, .mat, .uff or .unv. Throws SweepFileError naming file, place and
 // rule.
 std::vector<ImportedResponse> import_responses(const std::string& path);

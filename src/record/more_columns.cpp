@@ -42,19 +42,6 @@ const std::set<std::string> known_columns{"dwell",
                                           "reason",
                                           "reason_value"};
 
-bool has_table(Database& database, const std::string& name) {
-  Statement found{database, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?"};
-  found.bind(name);
-  return found.step();
-}
-
-std::vector<std::string> columns_of(Database& database, const std::string& table) {
-  std::vector<std::string> names;
-  Statement rows{database, "PRAGMA table_info(" + table + ")"};
-  while (rows.step()) names.push_back(rows.text(1));
-  return names;
-}
-
 bool holds_numbers(Database& database, const std::string& column) {
   Statement row{database, "SELECT count(*) FROM point WHERE typeof(\"" + column +
                               "\") IN ('real', 'integer')"};
@@ -106,7 +93,8 @@ std::optional<StoredChoe> choe_of(const Json& row) {
   const Json bands = part("bands");
   const Json models = part("band_models");
   const std::size_t points = choe.freq_hz.size();
-  bool whole = points > 0 && choe.nominal.size() == points && choe.weight.size() == points &&
+  bool whole = bands.is_array() && models.is_array() && points > 0 &&
+               choe.nominal.size() == points && choe.weight.size() == points &&
                bands.size() == models.size() && choe.additive.size() == models.size();
   for (const auto& each : choe.additive) whole = whole && each.size() == points;
   if (!whole) return {};
@@ -162,7 +150,7 @@ void read_more_columns(Database& database, std::vector<StoredResponse>& response
     for (StoredPoint& point : response.points)
       points[{point.dwell, point.tone, point.input, point.output}] = &point;
   }
-  for (const std::string& column : columns_of(database, "point")) {
+  for (const std::string& column : database.columns_of("point")) {
     if (known_columns.contains(column) || !holds_numbers(database, column)) continue;
     Statement rows{database, "SELECT dwell, tone, input, output, \"" + column + "\" FROM point"};
     while (rows.step()) {
@@ -176,8 +164,8 @@ void read_more_columns(Database& database, std::vector<StoredResponse>& response
 }
 
 std::vector<StoredFit> read_fits(Database& database) {
-  if (!has_table(database, "fit")) return {};
-  const std::vector<std::string> columns = columns_of(database, "fit");
+  if (!database.has_table("fit")) return {};
+  const std::vector<std::string> columns = database.columns_of("fit");
   std::vector<StoredFit> fits;
   Statement all{database, "SELECT * FROM fit"};
   while (all.step()) {

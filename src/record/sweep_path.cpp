@@ -21,9 +21,21 @@ void refuse_in_use(const std::string& path) {
 
 constexpr const char* old = "-old";
 
-// With the log in which a killed run may have its last points.
+// Puts the last points of a killed run from the log into the file: a file without a log is moved at
+// one stroke.
+void empty_log(const std::string& path) noexcept {
+  try {
+    Database database{path, Database::Mode::write};
+    database.pragma("wal_checkpoint(TRUNCATE)");
+  } catch (const SweepFileError&) {
+    // No sweep file, or no room for it: then the log goes along.
+  }
+}
+
+// The file goes last: killed in between it still stands under its old name.
 std::error_code move_sweep_file(const std::string& from, const std::string& to) noexcept {
   remove_sweep_file(to);
+  empty_log(from);
   std::error_code error;
   for (const char* suffix : {"-wal", "-journal", ""}) {
     if (std::filesystem::exists(from + suffix, error)) {
@@ -59,13 +71,36 @@ void set_aside(const std::string& path) {
   }
 }
 
+// Throws where there is one that is not to be replaced, saying whether it can be resumed, or one
+// that is being written; sets aside one that is to be replaced.
+void make_way(const std::string& path, bool replace) {
+  if (!std::filesystem::exists(path)) return;
+  if (!replace) {
+    refuse_in_use(path);
+    const std::string resumable =
+        can_be_resumed(path)
+            ? ", and its run was interrupted: `sinerig resume " + path + "` goes on with it"
+            : "";
+    throw FileExists(path + ": exists already" + resumable +
+                     "; choose another name with -o, or --force to replace it");
+  }
+  const FileLock nobody_writes{path, file_in_use};
+  set_aside(path);
+}
+
 }  // namespace
+
+void remove_leftovers(const std::string& path) noexcept {
+  std::error_code not_there;
+  for (const char* suffix : {"-wal", "-shm", "-journal", "-spare"}) {
+    std::filesystem::remove(path + suffix, not_there);
+  }
+}
 
 void remove_sweep_file(const std::string& path) noexcept {
   std::error_code not_there;
-  for (const char* suffix : {"", "-wal", "-shm", "-journal", "-spare"}) {
-    std::filesystem::remove(path + suffix, not_there);
-  }
+  std::filesystem::remove(path, not_there);
+  remove_leftovers(path);
 }
 
 void drop_old(const std::string& path) noexcept {
@@ -78,23 +113,15 @@ void put_old_back(const std::string& path) noexcept {
   if (std::filesystem::exists(path + old, error)) move_sweep_file(path + old, path);
 }
 
-void make_way(const std::string& path, bool replace) {
-  if (!std::filesystem::exists(path)) {
-    // The log of a file that somebody removed by hand is not that of the new one.
-    remove_sweep_file(path);
-    return;
+std::unique_ptr<FileLock> claim_path(const std::string& path, bool replace) {
+  std::unique_ptr<FileLock> claimed;
+  while (!claimed) {
+    make_way(path, replace);
+    claimed = FileLock::claim(path);
   }
-  if (!replace) {
-    refuse_in_use(path);
-    const std::string resumable =
-        can_be_resumed(path)
-            ? ", and its run was interrupted: `sinerig resume " + path + "` goes on with it"
-            : "";
-    throw FileExists(path + ": exists already" + resumable +
-                     "; choose another name with -o, or --force to replace it");
-  }
-  const FileLock nobody_writes{path, file_in_use};
-  set_aside(path);
+  // The log of a file that somebody removed by hand is not that of the new one.
+  remove_leftovers(path);
+  return claimed;
 }
 
 }  // namespace sinerig::record

@@ -1,14 +1,18 @@
 // What stands where a sweep file is to be.
 #pragma once
 
+#include <memory>
 #include <string>
+
+#include "record/file_lock.h"
 
 namespace sinerig::record {
 
-// Makes the path free for a new file. Throws FileExists where there is one that is not to be
-// replaced, saying whether it can be resumed; FileInUse where one is being written. One that is to
-// be replaced is set aside, as NAME.sweep-old, until either of the two below.
-void make_way(const std::string& path, bool replace);
+// An empty file under this name, locked. Throws FileExists where there is one that is not to be
+// replaced, saying whether it can be resumed; FileInUse where one is being written; SweepFileError
+// where none can be made. One that is to be replaced is set aside, as NAME.sweep-old, until either
+// of the two below.
+std::unique_ptr<FileLock> claim_path(const std::string& path, bool replace);
 
 // The new file has taken the place of the old one for good.
 void drop_old(const std::string& path) noexcept;

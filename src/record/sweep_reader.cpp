@@ -36,7 +36,11 @@ bool has_column(Database& database, const std::string& table, const std::string&
   return column.step();
 }
 
-SweepPlan read_plan(Database& database, double rate_hz) {
+void refuse_damaged(const std::string& path, const std::string& what) {
+  throw SweepFileError(path + ": is damaged: " + what);
+}
+
+SweepPlan read_plan(Database& database, double rate_hz, const std::string& path) {
   SweepPlan plan{.rate_hz = rate_hz, .dwells = {}};
   const std::string sub_band = has_column(database, "dwell", "sub_band") ? "sub_band" : "0";
   Statement dwells{database,
@@ -56,10 +60,12 @@ SweepPlan read_plan(Database& database, double rate_hz) {
   Statement tones{database,
                   "SELECT dwell, cycles, amplitude, phase_rad FROM tone ORDER BY dwell, tone"};
   while (tones.step()) {
-    plan.dwells.at(whole<std::size_t>(tones, 0))
-        .tones.push_back({.cycles = whole<std::uint64_t>(tones, 1),
-                          .amplitude = tones.number(2),
-                          .phase_rad = tones.number(3)});
+    const auto dwell = whole<std::size_t>(tones, 0);
+    if (dwell >= plan.dwells.size())
+      refuse_damaged(path, "a tone of dwell " + std::to_string(dwell) + ", which it does not have");
+    plan.dwells[dwell].tones.push_back({.cycles = whole<std::uint64_t>(tones, 1),
+                                        .amplitude = tones.number(2),
+                                        .phase_rad = tones.number(3)});
   }
   return plan;
 }
@@ -151,15 +157,9 @@ std::vector<StoredTiming> read_timings(Database& database) {
   return timings;
 }
 
-// These tables came after the first files of this version.
-bool has_table(Database& database, const std::string& name) {
-  Statement found{database, "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ?"};
-  found.bind(name);
-  return found.step();
-}
-
+// The tables of these two came after the first files of this version.
 std::vector<StoredPart> read_parts(Database& database) {
-  if (!has_table(database, "part")) return {};
+  if (!database.has_table("part")) return {};
   std::vector<StoredPart> parts;
   Statement rows{database,
                  "SELECT started_utc, finished_utc, outcome, detail, first_dwell, first_tick "
@@ -176,7 +176,7 @@ std::vector<StoredPart> read_parts(Database& database) {
 }
 
 std::map<std::uint32_t, double> read_lags(Database& database) {
-  if (!has_table(database, "durability")) return {};
+  if (!database.has_table("durability")) return {};
   std::map<std::uint32_t, double> lags;
   Statement rows{database, "SELECT dwell, lag_s FROM durability"};
   while (rows.step()) lags[whole<std::uint32_t>(rows, 0)] = rows.number(1);
@@ -198,10 +198,25 @@ std::string StoredRun::fact(const std::string& key) const {
   return found == facts.end() ? std::string{} : found->second;
 }
 
+void check_channels(const StoredRun& run, const std::string& path) {
+  const auto check = [&](std::uint32_t channel, const char* whose) {
+    if (channel >= run.channels.size())
+      refuse_damaged(path, whose + std::string{" of channel "} + std::to_string(channel) +
+                               ", which it does not have");
+  };
+  for (const StoredResponse& response : run.responses) {
+    check(response.input, "points");
+    check(response.output, "points");
+  }
+  for (const StoredEvent& event : run.events) check(event.channel, "an event");
+}
+
 StoredRun read_sweep(const std::string& path) {
   if (!std::filesystem::exists(path)) throw SweepFileError(path + ": does not exist");
   Database database{path, Database::Mode::read};
   check_identity(database, path);
+  // The file may be written meanwhile: all tables as they were at one moment.
+  database.execute("BEGIN");
 
   StoredRun run;
   Statement facts{database, "SELECT key, value FROM run"};
@@ -209,7 +224,7 @@ StoredRun read_sweep(const std::string& path) {
   Statement channels{database, "SELECT name, unit FROM channel ORDER BY id"};
   while (channels.step())
     run.channels.push_back({.name = channels.text(0), .unit = channels.text(1)});
-  run.plan = read_plan(database, std::strtod(run.fact("rate_hz").c_str(), nullptr));
+  run.plan = read_plan(database, std::strtod(run.fact("rate_hz").c_str(), nullptr), path);
   run.responses = read_responses(database, run.plan.rate_hz);
   // What drives the plant in another response is on the loop's side of the hold, as the input is:
   // the sensitivity, torque over applied, has no plant and no hold between the two.
@@ -225,6 +240,7 @@ StoredRun read_sweep(const std::string& path) {
   run.timings = read_timings(database);
   run.parts = read_parts(database);
   run.lag_s = read_lags(database);
+  check_channels(run, path);
   return run;
 }
 

@@ -35,9 +35,9 @@ std::string exact(double value) {
 
 SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists if_exists)
     : path_{path}, created_{true}, replaces_{if_exists == IfExists::replace} {
-  make_way(path, replaces_);
-  database_ = std::make_unique<Database>(path, Database::Mode::create);
+  lock_ = claim_path(path, replaces_);
   try {
+    database_ = std::make_unique<Database>(path, Database::Mode::write);
     open();
     begin();
     database_->execute("PRAGMA application_id = " + std::to_string(application_id) +
@@ -46,8 +46,6 @@ SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists 
     rows_ = std::make_unique<RecordRows>(*database_, info);
     write_head(info);
     put_on_disk();
-  } catch (const FileInUse&) {
-    throw;
   } catch (...) {
     discard();
     throw;
@@ -65,9 +63,7 @@ SweepWriter::SweepWriter(const std::string& path, const RunInfo& info)
 SweepWriter::~SweepWriter() = default;
 
 void SweepWriter::open() {
-  // A file without a page is not yet there: this makes it one.
   database_->execute("PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;");
-  if (!lock_) lock_ = std::make_unique<FileLock>(path_, file_in_use);
   spare_ = std::make_unique<SpareRoom>(path_);
 }
 

@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "record/uff58.h"
+#include "record/utf8.h"
 
 namespace sinerig::record {
 
@@ -88,12 +89,10 @@ ChannelInfo channel_of(const Dataset& data, const std::string& key, std::size_t 
                       none(column(data.lines[axis_line], 47, 20))};
   for (std::size_t i = 0; i < 5; ++i) {
     const std::string line = trimmed(data.lines[i]);
-    const std::size_t open = line.rfind('[');
-    if (line.rfind(key, 0) != 0 || open == std::string::npos || line.back() != ']') continue;
-    channel = {trimmed(line.substr(key.size(), open - key.size())),
-               line.substr(open + 1, line.size() - open - 2)};
+    if (line.rfind(key, 0) == 0 && line.back() == ']')
+      channel = channel_from_text(line.substr(key.size()));
   }
-  return channel;
+  return {as_utf8(channel.name), as_utf8(channel.unit)};
 }
 
 // As the writer puts it into the first identification line; 0 where it is not there.
@@ -133,7 +132,7 @@ std::vector<StoredPoint> points_of(const Dataset& data) {
     StoredPoint point = imported_point();
     point.frequency_hz = abscissa * to_hz;
     point.response = {values.at(at), layout.complex ? values.at(at + 1) : 0.0};
-    if (point.frequency_hz > 0.0) points.push_back(point);
+    points.push_back(point);
   }
   return points;
 }
@@ -160,8 +159,9 @@ std::vector<ImportedResponse> read_uff58(const std::string& path) {
     Dataset data{.path = path, .first_line = number + 1, .lines = {}};
     while (next() && trimmed(line) != "-1") data.lines.push_back(line);
     if (kind != "58") continue;
+    if (data.lines.size() < 11) data.refuse(0, "dataset 58 without data");
+    if (data.integer(5, 0, 5) != frequency_response || data.integer(6, 10, 10) == 0) continue;
     if (data.lines.size() < 12) data.refuse(0, "dataset 58 without data");
-    if (data.integer(5, 0, 5) != frequency_response) continue;
     responses.push_back({.input = channel_of(data, "input:", 9),
                          .output = channel_of(data, "output:", 8),
                          .points = points_of(data),

@@ -1,25 +1,32 @@
+#include <algorithm>
 #include <cmath>
 #include <ostream>
 
 #include "record/point_columns.h"
 #include "record/text.h"
 #include "record/uff58.h"
+#include "record/utf8.h"
 
 namespace sinerig::record {
 
 namespace {
 
 constexpr std::size_t abscissa_columns = 13;
+constexpr std::size_t line_columns = 80;
 
-// As many digits as fit beside one blank. FORTRAN takes a number with a decimal point as it stands,
-// whatever the digits of the E13.5 that reads it.
+// At least ten digits from 1 mHz on, nine below. FORTRAN takes a number with a decimal point as it
+// stands, whatever the digits of the E13.5 that reads it. In front of the first number of a line no
+// blank is needed.
 std::string abscissa(double value) {
+  if (value >= 1e-3 && value < 0.1) return text("%.12f", value).substr(1);
+  const bool plain = value >= 0.1 && value < 1e10;
   for (int digits = 12; digits > 5; --digits) {
-    const bool plain = value >= 1e-3 && value < 1e7;
     const int before = plain ? std::max(1, static_cast<int>(std::floor(std::log10(value))) + 1) : 1;
-    const std::string number =
+    std::string number =
         plain ? text("%.*f", std::max(1, digits - before), value) : text("%.*E", digits - 1, value);
-    if (number.size() < abscissa_columns)
+    if (const std::size_t zero = number.find("E-0"); zero != std::string::npos)
+      number.erase(zero + 2, 1);
+    if (number.size() < abscissa_columns || (!plain && number.size() == abscissa_columns))
       return std::string(abscissa_columns - number.size(), ' ') + number;
   }
   return text("%13.5E", value);
@@ -27,7 +34,13 @@ std::string abscissa(double value) {
 
 // A line of at most 80 columns; an empty one is NONE.
 std::string id_line(const std::string& line) {
-  return (line.empty() ? "NONE" : line.substr(0, 80)) + "\n";
+  return (line.empty() ? "NONE" : shortened(line, line_columns)) + "\n";
+}
+
+// The unit stands behind the name, where a line that is cut off would lose it: the name gives way.
+std::string channel_line(const std::string& key, const ChannelInfo& channel) {
+  const std::string unit = " [" + shortened(channel.unit, line_columns / 2) + "]";
+  return id_line(key + shortened(channel.name, line_columns - key.size() - unit.size()) + unit);
 }
 
 // Specific data type of the format for a unit: displacement 8, velocity 11, acceleration 12,
@@ -41,8 +54,13 @@ int data_type(const std::string& unit) {
 }
 
 std::string axis_line(int type, const std::string& label, const std::string& unit) {
-  return text("%10d%5d%5d%5d %-20.20s %-20.20s\n", type, 0, 0, 0,
-              label.empty() ? "NONE" : label.c_str(), unit.empty() ? "NONE" : unit.c_str());
+  return text("%10d%5d%5d%5d %-20s %-20s\n", type, 0, 0, 0,
+              label.empty() ? "NONE" : shortened(label, 20).c_str(),
+              unit.empty() ? "NONE" : shortened(unit, 20).c_str());
+}
+
+bool has_response(const StoredPoint& point) {
+  return std::isfinite(std::abs(point.response));
 }
 
 void write_dataset(std::ostream& stream, const StoredRun& run, const StoredResponse& response,
@@ -51,20 +69,20 @@ void write_dataset(std::ostream& stream, const StoredRun& run, const StoredRespo
   const ChannelInfo& output = run.channels.at(response.output);
   std::vector<const StoredPoint*> points;
   for (const StoredPoint& point : response.points)
-    if (std::isfinite(std::abs(point.response))) points.push_back(&point);
+    if (has_response(point)) points.push_back(&point);
+  if (points.empty()) return;
 
   const std::string hold =
       response.hold_rate_hz > 0.0 ? text("hold_rate_hz=%.15g ", response.hold_rate_hz) : "";
   stream << "    -1\n    58\n"
          << id_line("sinerig " + hold + run_name) << id_line(response_convention)
-         << id_line(run.fact("started_utc"))
-         << id_line("output: " + output.name + " [" + output.unit + "]")
-         << id_line("input: " + input.name + " [" + input.unit + "]")
-         << text("%5d%10d%5d%10d %-10.10s%10d%4d %-10.10s%10d%4d\n", 4, 0, 0, 0,
-                 output.name.c_str(), static_cast<int>(response.output), 0, input.name.c_str(),
-                 static_cast<int>(response.input), 0)
+         << id_line(run.fact("started_utc")) << channel_line("output: ", output)
+         << channel_line("input: ", input)
+         << text("%5d%10d%5d%10d %-10s%10d%4d %-10s%10d%4d\n", 4, 0, 0, 0,
+                 shortened(output.name, 10).c_str(), static_cast<int>(response.output), 0,
+                 shortened(input.name, 10).c_str(), static_cast<int>(response.input), 0)
          << text("%10d%10zu%10d%13.5E%13.5E%13.5E\n", 6, points.size(), 0,
-                 points.empty() ? 0.0 : points.front()->frequency_hz, 0.0, 0.0)
+                 points.front()->frequency_hz, 0.0, 0.0)
          << axis_line(18, "Frequency", "Hz")
          << axis_line(data_type(output.unit), output.name, output.unit)
          << axis_line(data_type(input.unit), input.name, input.unit) << axis_line(0, "", "");
@@ -76,6 +94,10 @@ void write_dataset(std::ostream& stream, const StoredRun& run, const StoredRespo
 }
 
 }  // namespace
+
+bool fits_uff58(const StoredResponse& response) {
+  return std::any_of(response.points.begin(), response.points.end(), has_response);
+}
 
 void write_uff58(std::ostream& stream, const StoredRun& run,
                  const std::vector<const StoredResponse*>& responses, const std::string& run_name) {

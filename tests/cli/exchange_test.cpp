@@ -1,18 +1,57 @@
 // Other programs get the same H out of what is exported.
 #include <cmath>
+#include <complex>
+#include <cstdint>
 #include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "record/exporters.h"
+#include "record/fit_store.h"
 #include "record/sweep_reader.h"
 #include "support/program.h"
+#include "support/stored_runs.h"
 
 namespace sinerig {
 namespace {
 
 using testing::HasSubstr;
+
+// A run with whatever may stand in one.
+record::StoredRun a_run_of_every_word() {
+  record::StoredRun run = test::two_channel_run(40);
+  const auto name_points = [&](std::string record::StoredPoint::*word, auto first) {
+    using Enum = decltype(first);
+    const std::string none = to_string(static_cast<Enum>(UINT8_MAX));
+    for (std::uint8_t i = 0; to_string(static_cast<Enum>(i)) != none; ++i)
+      run.responses[1].points.at(i).*word = to_string(static_cast<Enum>(i));
+  };
+  name_points(&record::StoredPoint::status, PointStatus{});
+  name_points(&record::StoredPoint::reason, PointReason{});
+  name_points(&record::StoredPoint::settled_by, SettledBy{});
+  const std::string none = to_string(static_cast<EventKind>(UINT8_MAX));
+  for (std::uint8_t i = 0; to_string(static_cast<EventKind>(i)) != none; ++i) {
+    run.events.push_back({.tick = i,
+                          .dwell = 0,
+                          .kind = to_string(static_cast<EventKind>(i)),
+                          .channel = i % 4U,
+                          .fault = i % 2 == 0 ? "none" : "stale",
+                          .value = i % 3 == 0 ? std::nan("") : 1.0,
+                          .detail = i % 5 == 0 ? "" : "why"});
+  }
+  for (const char* outcome : {"done", "interrupted", "stopped", "killed", ""})
+    run.parts.push_back({.started_utc = "2026-03-01T22:14:05Z",
+                         .finished_utc = "",
+                         .outcome = outcome,
+                         .detail = "",
+                         .first_dwell = 0,
+                         .first_tick = 0});
+  run.timings.back().usage.reset();
+  run.lag_s[0] = 0.25;
+  return run;
+}
 
 class Exchange : public testing::Test {
  protected:
@@ -109,7 +148,7 @@ try:
 except ImportError:
     pandas = None
 if pandas:
-    frame = pandas.read_csv('axis.csv')
+    frame = pandas.read_csv('axis.csv', float_precision='round_trip')
     assert list(frame.columns[:5]) == ['freq_hz', 're', 'im', 'gain_db', 'phase_deg']
     assert (frame['re'].to_numpy() == table['re']).all()
 for row, entry in zip(rows, table):
@@ -166,18 +205,29 @@ TEST_F(Exchange, JsonFollowsItsSchema) {
   if (workshop_.shell("/usr/bin/python3 -c 'import jsonschema'").exit_code != 0)
     GTEST_SKIP() << "no jsonschema here (Debian: apt install python3-jsonschema)";
   ASSERT_EQ(workshop_.sinerig("export axis.sweep --format json -o axis.json").exit_code, 0);
+  workshop_.write("other.csv", "freq_hz,re,im,status,settled_by\n1,1,0,fine,by itself\n");
+  ASSERT_EQ(workshop_.sinerig("export other.csv --format json -o other.json").exit_code, 0);
+  std::ostringstream every;
+  record::write_json(every, a_run_of_every_word());
+  workshop_.write("every.json", every.str());
   workshop_.write("validate.py", R"py(
 import json, sys, jsonschema
 schema = json.load(open(sys.argv[1]))
 jsonschema.Draft7Validator.check_schema(schema)
-document = json.load(open('axis.json'))
-jsonschema.validate(document, schema)
-document['responses'][0]['points'][0]['status'] = 'fine'
-try:
-    jsonschema.validate(document, schema)
-except jsonschema.ValidationError:
-    sys.exit(0)
-sys.exit('a status that does not exist was accepted')
+for name in ('axis.json', 'every.json', 'other.json'):
+    document = json.load(open(name))
+    try:
+        jsonschema.validate(document, schema)
+    except jsonschema.ValidationError as error:
+        sys.exit(f'{name}: {error}')
+for key in ('status', 'settled_by'):
+    document = json.load(open('axis.json'))
+    document['responses'][0]['points'][0][key] = 'fine'
+    try:
+        jsonschema.validate(document, schema)
+    except jsonschema.ValidationError:
+        continue
+    sys.exit(f'a {key} that does not exist was accepted')
 )py");
   const auto python = workshop_.shell("/usr/bin/python3 validate.py " SINERIG_SOURCE_DIR
                                       "/docs/sinerig-sweep.schema.json");
@@ -236,6 +286,75 @@ TEST_F(Exchange, CompareTellsTheDriftOfResonancesAndMargins) {
   EXPECT_EQ(quiet.output + quiet.errors, "");
 }
 
+// A full disk behind `>`: no exit code may call that a table.
+TEST_F(Exchange, OutputThatIsLostIsAFailure) {
+  for (const char* command : {"show axis.sweep", "export axis.sweep",
+                              "export axis.sweep "
+                              "--format json",
+                              "completion bash", "--help", "--version"}) {
+    const auto lost = workshop_.sinerig(command + std::string{" >/dev/full"});
+    EXPECT_EQ(lost.exit_code, 1) << command;
+    EXPECT_THAT(lost.errors, HasSubstr("error: standard output cannot be written")) << command;
+  }
+  // What went wrong before says more than that.
+  EXPECT_EQ(workshop_.sinerig("show none.sweep >/dev/full").exit_code, 1);
+  EXPECT_EQ(workshop_.sinerig("export axis.sweep --format mat >/dev/full").exit_code, 2);
+  // Whoever reads no further wanted no more.
+  EXPECT_EQ(workshop_
+                .shell("trap '' PIPE; (" SINERIG_BINARY
+                       " export axis.sweep --format json; echo $? >code) | :")
+                .errors,
+            "");
+  EXPECT_EQ(workshop_.read("code"), "0\n");
+}
+
+TEST_F(Exchange, UffLeavesOutAResponseWithoutAPointAndSaysSo) {
+  workshop_.shell("cp axis.sweep half.sweep");
+  const auto clear = [&](const char* channel) {
+    record::Database database{(workshop_.folder() / "half.sweep").string(),
+                              record::Database::Mode::write};
+    database.execute(
+        "UPDATE point SET re = NULL, im = NULL WHERE output = (SELECT id FROM channel "
+        "WHERE name = '" +
+        std::string{channel} + "')");
+  };
+  clear("motor");
+  const auto half = workshop_.sinerig("export half.sweep --format uff -o half.uff");
+  EXPECT_EQ(half.exit_code, 0) << half.errors;
+  EXPECT_THAT(half.errors, HasSubstr("motor has no point with a response; left out"));
+  EXPECT_EQ(workshop_.sinerig("show half.uff").exit_code, 0);
+  clear("load");
+  const auto none = workshop_.sinerig("export half.sweep --format uff -o none.uff");
+  EXPECT_EQ(none.exit_code, 1);
+  EXPECT_THAT(none.errors, HasSubstr("no point with a response, nothing to write"));
+  EXPECT_FALSE(workshop_.has("none.uff"));
+}
+
+// The table `fit` as file-format.md leaves it to other programs: as columns, as one object.
+TEST_F(Exchange, ATableOfFitsOfAnotherProgramIsNoObstacle) {
+  const char* const tables[] = {
+      "CREATE TABLE fit (input INTEGER, output INTEGER, num TEXT NOT NULL, den TEXT NOT NULL, "
+      "delay_s REAL, choe TEXT); INSERT INTO fit VALUES (1, 2, '[1]', '[0.01, 1]', 0.001, "
+      "'{\"choe\": {\"bands\": \"none\", \"band_models\": 1, \"freq_hz\": [1]}}')",
+      "CREATE TABLE fit (input INTEGER, output INTEGER, model TEXT); INSERT INTO fit VALUES (1, 2, "
+      "'{\"num\": [1], \"den\": [0.01, 1], \"delay_s\": 0.001}')"};
+  for (const char* table : tables) {
+    workshop_.shell("cp axis.sweep foreign.sweep");
+    const std::string file = (workshop_.folder() / "foreign.sweep").string();
+    record::Database{file, record::Database::Mode::write}.execute(table);
+    ASSERT_EQ(record::read_sweep(file).fits.size(), 1U);
+    const auto fit = workshop_.sinerig("fit foreign.sweep --poles 3 --zeros 2 --delay fit --json");
+    EXPECT_EQ(fit.exit_code, 0) << fit.errors;
+    const auto fits = record::read_sweep(file).fits;
+    ASSERT_EQ(fits.size(), 2U);
+    EXPECT_EQ(fits[1].den.size(), 4U);
+    EXPECT_EQ(fits[1].label, "ml");
+    EXPECT_EQ(fits[0].den, (std::vector<double>{0.01, 1.0}));
+    EXPECT_EQ(workshop_.sinerig("report foreign.sweep").exit_code, 0);
+    EXPECT_EQ(record::last_fit(file, 1, 2).has_value(), true);
+  }
+}
+
 TEST_F(Exchange, CommandsTakeFilesMeasuredElsewhere) {
   workshop_.write("other.csv", "freq_hz,re,im,std\n1,1,0,0.01\n10,0.5,-0.5,0.01\n");
   EXPECT_EQ(workshop_.sinerig("report other.csv").exit_code, 0);
@@ -260,7 +379,16 @@ TEST_F(Exchange, FitTakesEveryFormatAndTheReportDrawsTheModel) {
                       name);
     const auto fit = workshop_.sinerig("fit " + name + order);
     EXPECT_EQ(fit.exit_code, 0) << fit.errors;
-    EXPECT_THAT(fit.output, HasSubstr("\"den\""));
+    // The rate of the hold has come along, and H. The weights differ: what an export holds of the
+    // scatter is less than what the sweep file does.
+    const auto json = nlohmann::json::parse(fit.output);
+    EXPECT_DOUBLE_EQ(json["hold_period_s"].get<double>(), 1.0 / run.plan.rate_hz) << format;
+    ASSERT_EQ(json["poles"].size(), run.fits.front().poles.size()) << format;
+    for (std::size_t i = 0; i < json["poles"].size(); ++i) {
+      const std::complex<double> pole{json["poles"][i][0], json["poles"][i][1]};
+      const std::complex<double> wanted = run.fits.front().poles[i];
+      EXPECT_LE(std::abs(pole - wanted), 1e-3 * std::abs(wanted)) << format << ' ' << i;
+    }
   }
 }
 

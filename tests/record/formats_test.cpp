@@ -1,18 +1,22 @@
 // What is written can be read back: CSV and MATLAB files to the last bit, UFF 58 to its columns.
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <limits>
+#include <set>
 #include <sstream>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "record/exporters.h"
 #include "record/mat_file.h"
 #include "record/measured.h"
 #include "record/point_columns.h"
 #include "record/uff58.h"
+#include "support/full_disk.h"
 #include "support/program.h"
 #include "support/stored_runs.h"
 
@@ -123,6 +127,47 @@ TEST_F(Formats, MatRefusesResponsesOfDifferentFrequencies) {
   }
 }
 
+TEST_F(Formats, MatOnAFullDiskIsAnErrorAndLeavesTheFileThatWasThere) {
+  const std::vector<const StoredResponse*> both{&run_.responses[0], &run_.responses[1]};
+  const auto refusal = [&](const std::string& name) -> std::string {
+    try {
+      write_mat(path(name), run_, both);
+    } catch (const SweepFileError& error) {
+      return error.what();
+    }
+    return "written";
+  };
+  ASSERT_EQ(refusal("whole.mat"), "written");
+  const auto size = std::filesystem::file_size(path("whole.mat"));
+  workshop_.write("a.mat", "what was there");
+  // Wherever the room ends: in the head, in the numbers, in the last text.
+  for (const auto room : {size / 1000, size / 3, size - 1}) {
+    const test::FullDisk full{room};
+    EXPECT_THAT(refusal("a.mat"), HasSubstr("a.mat: cannot be written")) << room;
+  }
+  EXPECT_EQ(workshop_.read("a.mat"), "what was there");
+  EXPECT_FALSE(workshop_.has("a.mat.part"));
+  EXPECT_EQ(refusal("a.mat"), "written");
+  EXPECT_EQ(import_responses(path("a.mat")).size(), 2U);
+  EXPECT_FALSE(workshop_.has("a.mat.part"));
+}
+
+TEST_F(Formats, MatIsWrittenBehindALinkAndNotInPlaceOfADevice) {
+  const std::vector<const StoredResponse*> one{&run_.responses[0]};
+  workshop_.write("a.mat", "what was there");
+  std::filesystem::create_symlink("a.mat", path("link.mat"));
+  write_mat(path("link.mat"), run_, one);
+  EXPECT_TRUE(std::filesystem::is_symlink(path("link.mat")));
+  EXPECT_EQ(import_responses(path("a.mat")).size(), 1U);
+  std::filesystem::create_symlink("/dev/full", path("full.mat"));
+  try {
+    write_mat(path("full.mat"), run_, one);
+    FAIL();
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("full.mat: cannot be written: it is not a plain file"));
+  }
+}
+
 TEST_F(Formats, UffKeepsWhatItsColumnsHold) {
   std::ostringstream text;
   write_uff58(text, run_, {&run_.responses[0], &run_.responses[1]}, "axis");
@@ -150,6 +195,77 @@ TEST_F(Formats, UffKeepsItsColumns) {
     EXPECT_EQ(line.size(), 53U);
     EXPECT_NE(line.substr(0, 13).find('.'), std::string::npos) << "FORTRAN would scale " << line;
   }
+}
+
+TEST_F(Formats, UffLeavesOutWhatHasNoPoint) {
+  for (StoredPoint& point : run_.responses[0].points) point.response = {nan_value, nan_value};
+  EXPECT_FALSE(fits_uff58(run_.responses[0]));
+  EXPECT_TRUE(fits_uff58(run_.responses[1]));
+  std::ostringstream text;
+  write_uff58(text, run_, {&run_.responses[0], &run_.responses[1]}, "axis");
+  workshop_.write("a.uff", text.str());
+  const auto back = import_responses(path("a.uff"));
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].output.name, "gyro");
+}
+
+TEST_F(Formats, UffOfNoPointDoesNotSpoilTheOthers) {
+  std::ostringstream whole;
+  write_uff58(whole, run_, {&run_.responses[1]}, "axis");
+  const std::string text = whole.str();
+  std::string empty;
+  std::istringstream lines{text};
+  std::string line;
+  for (int number = 1; number <= 13 && std::getline(lines, line); ++number) {
+    if (number == 9) line.replace(10, 10, "         0");
+    empty += line + "\n";
+  }
+  workshop_.write("a.uff", empty + "    -1\n" + text);
+  ASSERT_EQ(import_responses(path("a.uff")).size(), 1U);
+  EXPECT_THAT(refusal("b.uff", empty + "    -1\n"), HasSubstr("holds no frequency response"));
+}
+
+// A name gives way to its unit, whole characters at a time; the brackets of a unit are its own.
+TEST_F(Formats, UffKeepsUnitsOfLongNamesAndUnitsWithBrackets) {
+  std::string name;
+  for (int i = 0; i < 40; ++i) name += "é";
+  run_.channels[1].unit = "V [rms]";
+  run_.channels[3] = {name + " [x]", "µrad/s [peak [to peak]]"};
+  std::ostringstream text;
+  write_uff58(text, run_, {&run_.responses[1]}, "axis");
+  workshop_.write("a.uff", text.str());
+  const auto back = import_responses(path("a.uff"));
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].input.name, "applied");
+  EXPECT_EQ(back[0].input.unit, "V [rms]");
+  EXPECT_EQ(back[0].output.unit, run_.channels[3].unit);
+  EXPECT_EQ(back[0].output.name.size() % 2, 0U);
+  EXPECT_GT(back[0].output.name.size(), 40U);
+  EXPECT_EQ(name.rfind(back[0].output.name, 0), 0U);
+  std::istringstream lines{text.str()};
+  for (std::string line; std::getline(lines, line);) EXPECT_LE(line.size(), 80U) << line;
+}
+
+TEST_F(Formats, UffHoldsTenDigitsOfAFrequency) {
+  struct Case {
+    double frequency_hz;
+    double error;
+  };
+  const std::vector<Case> cases{{1.0000000449e-4, 5e-9},     {9.87654321098765e-4, 5e-9},
+                                {1.00000000449e-3, 5e-10},   {1.00000000449e-2, 5e-10},
+                                {0.0999999999987654, 5e-10}, {0.123456789012345, 5e-10},
+                                {9.99999999987654, 5e-10},   {1234.56789012345, 5e-10},
+                                {98765432.1098765, 5e-10},   {9876543210.98765, 5e-10}};
+  auto& points = run_.responses[1].points;
+  points.resize(cases.size());
+  for (std::size_t i = 0; i < cases.size(); ++i) points[i].frequency_hz = cases[i].frequency_hz;
+  std::ostringstream text;
+  write_uff58(text, run_, {&run_.responses[1]}, "axis");
+  workshop_.write("a.uff", text.str());
+  const auto back = import_responses(path("a.uff"));
+  ASSERT_EQ(back[0].points.size(), cases.size());
+  for (std::size_t i = 0; i < cases.size(); ++i)
+    EXPECT_NEAR(back[0].points[i].frequency_hz / cases[i].frequency_hz, 1.0, cases[i].error) << i;
 }
 
 TEST_F(Formats, ReadsUffOfOtherPrograms) {
@@ -199,7 +315,8 @@ TEST_F(Formats, RefusesWithPlaceAndRule) {
   EXPECT_THAT(refusal("a.csv", "freq,re,im\n1,2,3\n"), HasSubstr("a.csv:1: no column freq_hz"));
   EXPECT_THAT(refusal("a.csv", "freq_hz,gain,phase\n1,2,3\n"),
               HasSubstr("phase_deg (or phase_rad)"));
-  EXPECT_THAT(refusal("a.csv", "freq_hz,re,im\n0,2,3\n"), HasSubstr("has to be above zero"));
+  EXPECT_THAT(refusal("a.csv", "freq_hz,re,im\n0,2,3\n"),
+              HasSubstr("a.csv: has no point at a frequency above zero"));
   EXPECT_THAT(refusal("a.csv", "# nothing\n"), HasSubstr("holds no point"));
   EXPECT_THAT(refusal("a.mat", "no MATLAB"), HasSubstr("is not a MATLAB file"));
   EXPECT_THAT(refusal("a.uff", "    -1\n    58b\n"), HasSubstr("written as ASCII"));
@@ -260,6 +377,65 @@ TEST_F(Formats, PointsWithoutAFrequencyAreLeftOutAndCounted) {
   for (StoredPoint& point : run_.responses[1].points) point.frequency_hz = 0.0;
   write_mat(path("none.mat"), run_, {&run_.responses[1]});
   EXPECT_THROW(import_responses(path("none.mat")), SweepFileError);
+}
+
+// Network analysers begin at 0 Hz.
+TEST_F(Formats, APointAtZeroHertzIsLeftOutAndCountedInEveryFormat) {
+  workshop_.write("a.csv", "freq_hz,re,im\n0,1,0\n,1,0\n1,2,3\n");
+  const StoredRun csv = read_measured(path("a.csv"));
+  ASSERT_EQ(csv.responses[0].points.size(), 1U);
+  EXPECT_EQ(csv.fact(left_out_fact), "2");
+  run_.responses[1].points[0].frequency_hz = 0.0;
+  std::ostringstream text;
+  write_uff58(text, run_, {&run_.responses[1]}, "axis");
+  workshop_.write("a.uff", text.str());
+  const StoredRun uff = read_measured(path("a.uff"));
+  EXPECT_EQ(uff.responses[0].points.size(), 19U);
+  EXPECT_EQ(uff.fact(left_out_fact), "1");
+}
+
+// Programs of long ago write ° and µ as one byte, which JSON cannot hold.
+TEST_F(Formats, TextThatIsNotUtf8IsTakenForLatin1) {
+  workshop_.write("a.csv",
+                  "# output: N\xE4herung [\xB0]\nfreq_hz,re,im,reason\n1,1,0,\xB5 too large\n");
+  const StoredRun run = read_measured(path("a.csv"));
+  EXPECT_EQ(run.channels.at(2).name, "Näherung");
+  EXPECT_EQ(run.channels[2].unit, "°");
+  EXPECT_EQ(run.responses[0].points[0].reason, "µ too large");
+  std::ostringstream text;
+  write_uff58(text, run, {&run.responses[0]}, "axis");
+  std::string latin = text.str();
+  for (std::size_t at = 0; (at = latin.find("°")) != std::string::npos;) latin.erase(at, 1);
+  workshop_.write("a.uff", latin);
+  EXPECT_EQ(import_responses(path("a.uff"))[0].output.unit, "°");
+}
+
+// All that to_string() has a word for; behind the last value it has none.
+template <typename Enum>
+std::set<std::string> words() {
+  std::set<std::string> all;
+  const std::string none = to_string(static_cast<Enum>(UINT8_MAX));
+  for (std::uint8_t i = 0; to_string(static_cast<Enum>(i)) != none; ++i)
+    all.insert(to_string(static_cast<Enum>(i)));
+  return all;
+}
+
+TEST_F(Formats, TheSchemaOfTheJsonKnowsEveryWordOfARun) {
+  std::ifstream file{SINERIG_SOURCE_DIR "/docs/sinerig-sweep.schema.json"};
+  const auto known = nlohmann::json::parse(file)["definitions"]["run_words"]["properties"];
+  EXPECT_EQ(known["status"]["enum"].get<std::set<std::string>>(), words<PointStatus>());
+  std::set<std::string> settled_by = words<SettledBy>();
+  settled_by.insert("");  // a file from before it was kept
+  EXPECT_EQ(known["settled_by"]["enum"].get<std::set<std::string>>(), settled_by);
+}
+
+TEST_F(Formats, JsonTakesAnyText) {
+  run_.facts["rig_text"] = "# 5 \xB0 to each side";
+  run_.responses[1].points[3].reason = "half a character: \xC3";
+  std::ostringstream text;
+  write_json(text, run_);
+  const auto document = nlohmann::json::parse(text.str());
+  EXPECT_EQ(document["rig"]["text"], "# 5 \xEF\xBF\xBD to each side");
 }
 
 TEST_F(Formats, ANameWithACommaDoesNotShiftTheColumns) {

@@ -323,8 +323,8 @@ TEST_F(ResumedFile, HasOneWriterAtATime) {
     return "none";
   };
   EXPECT_THAT(refusal([&] { const SweepWriter second(path(), an_info()); }), HasSubstr(in_use));
-  EXPECT_THAT(refusal([&] { make_way(path(), true); }), HasSubstr(in_use));
-  EXPECT_THAT(refusal([&] { make_way(path(), false); }), HasSubstr(in_use));
+  EXPECT_THAT(refusal([&] { claim_path(path(), true); }), HasSubstr(in_use));
+  EXPECT_THAT(refusal([&] { claim_path(path(), false); }), HasSubstr(in_use));
   writer.begin_part({});
   dwell(writer, 0, 0);
   EXPECT_EQ(read_sweep(path()).responses.at(0).points.size(), 1U) << "readers are not locked out";
@@ -333,7 +333,7 @@ TEST_F(ResumedFile, HasOneWriterAtATime) {
 TEST_F(ResumedFile, IsNamedWhenANewRunWouldTakeItsPlace) {
   first_part();
   try {
-    make_way(path(), false);
+    claim_path(path(), false);
     FAIL();
   } catch (const FileExists& error) {
     EXPECT_EQ(error.what(), path() +

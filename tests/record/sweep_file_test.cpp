@@ -1,17 +1,20 @@
 // The sweep file: what is written is what is read, what is there is not overwritten, and what an
 // interrupted run leaves can be read.
 #include <cmath>
-#include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
+#include <utility>
 
 #include <gmock/gmock.h>
 #include <sqlite3.h>
-#include <sys/resource.h>
 
+#include "record/point_columns.h"
 #include "record/recorder.h"
 #include "record/schema.h"
+#include "record/stored_point.h"
 #include "record/sweep_reader.h"
+#include "support/full_disk.h"
 
 namespace sinerig::record {
 namespace {
@@ -143,6 +146,182 @@ TEST_F(SweepFile, IsReadBackAsItWasWritten) {
   EXPECT_THAT(run.events[1].detail, HasSubstr("gyro = 3 is outside its limit 2"));
 }
 
+// Every figure has a value of its own: none may come back as another.
+TEST_F(SweepFile, GivesEveryFigureOfAPointBack) {
+  const Point written{.dwell = 2,
+                      .tone = 3,
+                      .pair = 0,
+                      .input = 1,
+                      .output = 2,
+                      .status = PointStatus::distorted,
+                      .reason = PointReason::harmonics,
+                      .settled_by = SettledBy::both,
+                      .reason_value = 6.5,
+                      .frequency_hz = 7.5,
+                      .response = {8.5, 9.5},
+                      .covariance = {.re_re = 10.5, .re_im = 11.5, .im_im = 12.5},
+                      .dof = 13.5,
+                      .gain_interval_db = 14.5,
+                      .phase_interval_deg = 15.5,
+                      .input_amplitude = 16.5,
+                      .output_amplitude = 17.5,
+                      .snr_db = 18.5,
+                      .distortion = 19.5,
+                      .drift_per_s = 20.5,
+                      .samples = 2100.0,
+                      .lost = 22.0,
+                      .seconds = 23.5};
+  {
+    SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+    writer.write(written);
+    writer.finish();
+  }
+  const StoredPoint wanted = stored_point(written, 1000.0);
+  const StoredPoint back = read_sweep(path()).responses.at(0).points.at(0);
+  EXPECT_EQ(back.dwell, 2U);
+  EXPECT_EQ(back.tone, 3U);
+  EXPECT_EQ(back.input, 1U);
+  EXPECT_EQ(back.output, 2U);
+  EXPECT_EQ(back.frequency_hz, 7.5);
+  EXPECT_EQ(back.response, (std::complex<double>{8.5, 9.5}));
+  EXPECT_EQ(back.covariance.re_re, 10.5);
+  EXPECT_EQ(back.covariance.re_im, 11.5);
+  EXPECT_EQ(back.covariance.im_im, 12.5);
+  EXPECT_EQ(back.dof, 13.5);
+  EXPECT_EQ(back.gain_interval_db, 14.5);
+  EXPECT_EQ(back.phase_interval_deg, 15.5);
+  EXPECT_EQ(back.input_amplitude, 16.5);
+  EXPECT_EQ(back.output_amplitude, 17.5);
+  EXPECT_EQ(back.snr_db, 18.5);
+  EXPECT_EQ(back.distortion, 19.5);
+  EXPECT_EQ(back.drift_per_s, 20.5);
+  EXPECT_EQ(back.samples, 2100.0);
+  EXPECT_EQ(back.lost, 22.0);
+  EXPECT_EQ(back.seconds, 23.5);
+  EXPECT_EQ(back.reason_value, 6.5);
+  EXPECT_EQ(back.status, "distorted");
+  EXPECT_EQ(back.reason, "harmonics");
+  EXPECT_EQ(back.settled_by, "both");
+  EXPECT_TRUE(back.more.empty());
+  // A page that is filled while the run goes on shows what the file will.
+  for (const PointColumn& column : point_columns)
+    EXPECT_EQ(back.*column.value, wanted.*column.value) << column.name;
+  EXPECT_EQ(back.status, wanted.status);
+  EXPECT_EQ(back.reason, wanted.reason);
+  EXPECT_EQ(back.settled_by, wanted.settled_by);
+}
+
+// What another process may do at any time, once: before a reader begins with a statement.
+class BeforeStatement {
+ public:
+  BeforeStatement(std::string statement, std::function<void()> action)
+      : statement_{std::move(statement)}, action_{std::move(action)} {
+    current = this;
+    sqlite3_auto_extension(reinterpret_cast<void (*)()>(opened));
+  }
+  ~BeforeStatement() { sqlite3_cancel_auto_extension(reinterpret_cast<void (*)()>(opened)); }
+
+  bool happened() const { return !action_; }
+
+ private:
+  static int opened(sqlite3* database, const char**, const void*) {
+    sqlite3_trace_v2(database, SQLITE_TRACE_STMT, begun, current);
+    return SQLITE_OK;
+  }
+  static int begun(unsigned, void* self, void*, void* sql) {
+    auto& before = *static_cast<BeforeStatement*>(self);
+    const bool awaited =
+        std::string{static_cast<const char*>(sql)}.rfind(before.statement_, 0) == 0;
+    if (awaited && before.action_) std::exchange(before.action_, {})();
+    return 0;
+  }
+
+  static inline BeforeStatement* current = nullptr;
+  std::string statement_;
+  std::function<void()> action_;
+};
+
+// The same, before a database is opened.
+class BeforeOpening {
+ public:
+  explicit BeforeOpening(std::function<void()> action) {
+    action_ = std::move(action);
+    system_ = sqlite3_vfs_find(nullptr);
+    files_ = *system_;
+    files_.zName = "before_opening";
+    files_.xOpen = [](sqlite3_vfs*, const char* name, sqlite3_file* file, int flags, int* used) {
+      if (action_) std::exchange(action_, {})();
+      return system_->xOpen(system_, name, file, flags, used);
+    };
+    sqlite3_vfs_register(&files_, 1);
+  }
+  ~BeforeOpening() {
+    sqlite3_vfs_unregister(&files_);
+    sqlite3_vfs_register(system_, 1);
+  }
+
+  static bool happened() { return !action_; }
+
+ private:
+  static inline std::function<void()> action_;
+  static inline sqlite3_vfs* system_ = nullptr;
+  sqlite3_vfs files_{};
+};
+
+TEST_F(SweepFile, IsReadAsItWasAtOneMomentWhileItIsWritten) {
+  RunInfo info = an_info();
+  info.plan.refinement.candidates = {info.plan.dwells.back()};
+  SweepWriter writer{path(), info, SweepWriter::IfExists::refuse};
+  writer.begin_part({});
+  const BeforeStatement meanwhile{"SELECT dwell, cycles", [&] {
+                                    writer.write(Event{.kind = EventKind::refined, .dwell = 3});
+                                    writer.commit();
+                                  }};
+  const StoredRun run = read_sweep(path());
+  EXPECT_TRUE(meanwhile.happened());
+  EXPECT_EQ(run.plan.dwells.size(), 3U);
+  EXPECT_TRUE(run.events.empty());
+  EXPECT_EQ(read_sweep(path()).plan.dwells.size(), 4U);
+}
+
+TEST_F(SweepFile, ThatIsDamagedSaysWhatIsWrong) {
+  write_and_finish(path());
+  execute(path(), "INSERT INTO tone VALUES (7, 0, 1, 0.5, 0)");
+  EXPECT_EQ(refusal_of(path()), path() + ": is damaged: a tone of dwell 7, which it does not have");
+  execute(path(), "DELETE FROM tone; INSERT INTO event VALUES (NULL, 0, 0, 'gap', 9, '', 0, '')");
+  EXPECT_EQ(refusal_of(path()),
+            path() + ": is damaged: an event of channel 9, which it does not have");
+}
+
+// Of two that find the name free at the same moment one has it, whatever the other does.
+TEST_F(SweepFile, IsThatOfOneOfTwoWhoWantTheSameName) {
+  int written = 0;
+  int refused = 0;
+  const auto write = [&] {
+    try {
+      write_and_finish(path());
+      ++written;
+    } catch (const SweepFileError&) {
+      ++refused;
+    }
+  };
+  const BeforeOpening meanwhile{write};
+  write();
+  EXPECT_TRUE(meanwhile.happened());
+  EXPECT_EQ(written, 1);
+  EXPECT_EQ(refused, 1);
+  EXPECT_EQ(read_sweep(path()).fact("outcome"), "done");
+}
+
+TEST_F(SweepFile, IsClaimedByOne) {
+  const auto mine = FileLock::claim(path());
+  ASSERT_NE(mine, nullptr);
+  EXPECT_EQ(FileLock::claim(path()), nullptr);
+  write_and_finish(path("finished.sweep"));
+  EXPECT_EQ(FileLock::claim(path("finished.sweep")), nullptr);
+  EXPECT_THROW((FileLock{path(), "in use"}), FileInUse);
+}
+
 TEST_F(SweepFile, FromBeforeTheThreadsUsageWasKeptIsReadWithoutIt) {
   {
     SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
@@ -206,6 +385,14 @@ TEST_F(ReplacedFile, IsBackWhereTheNewRunNeverBegins) {
   EXPECT_FALSE(fs::exists(path() + "-old"));
   EXPECT_FALSE(fs::exists(path() + "-old-wal"));
   EXPECT_EQ(points(), 1U);
+}
+
+// Two files cannot be renamed at one stroke: a kill in between would leave the points of the log
+// with neither name.
+TEST_F(ReplacedFile, IsOneFileBeforeItIsSetAside) {
+  const SweepWriter writer{path(), an_info(), SweepWriter::IfExists::replace};
+  EXPECT_FALSE(fs::exists(path() + "-old-wal"));
+  EXPECT_EQ(read_sweep(path() + "-old").responses.at(0).points.size(), 1U);
 }
 
 TEST_F(ReplacedFile, IsGoneWhenTheNewRunBegins) {
@@ -279,31 +466,15 @@ TEST_F(SweepFile, ThatCannotBeCreatedSaysWhy) {
     SweepWriter{path("no/such/folder.sweep"), an_info(), SweepWriter::IfExists::refuse};
     FAIL();
   } catch (const SweepFileError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("cannot be opened: unable to open database file"));
+    EXPECT_THAT(error.what(), HasSubstr("cannot be created: No such file or directory"));
   }
 }
-
-// Files of this process cannot grow beyond `bytes` while it lives: a full disk.
-class FullDisk {
- public:
-  explicit FullDisk(rlim_t bytes) {
-    std::signal(SIGXFSZ, SIG_IGN);
-    getrlimit(RLIMIT_FSIZE, &before_);
-    rlimit limit = before_;
-    limit.rlim_cur = bytes;
-    setrlimit(RLIMIT_FSIZE, &limit);
-  }
-  ~FullDisk() { setrlimit(RLIMIT_FSIZE, &before_); }
-
- private:
-  rlimit before_{};
-};
 
 TEST_F(SweepFile, OnAFullDiskStopsTheLoopAndSaysSo) {
   Outbox outbox{1 << 10, 1 << 10, Outbox::WhenFull::wait};
   SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
   Recorder recorder{outbox, writer, {}};
-  const FullDisk full{fs::file_size(path() + "-wal") + 4096};
+  const test::FullDisk full{fs::file_size(path() + "-wal") + 4096};
   std::uint64_t put = 0;
   while (outbox.flush() && put < 1'000'000) {
     outbox.put(Event{.kind = EventKind::gap, .tick = put++});
