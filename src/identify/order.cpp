@@ -101,7 +101,8 @@ class Selector {
 
   void sweep_structures() {
     const int last = std::min(lowest_ + orders_above_the_lowest, last_order());
-    for (int poles = lowest_; poles <= last; ++poles)
+    const int first = std::max(lowest_ - 1, first_order());
+    for (int poles = first; poles <= last; ++poles)
       for (int origin = settings_.origin.value_or(0);
            origin <= settings_.origin.value_or(settings_.most_origin); ++origin)
         for (int fall = 0; fall <= settings_.most_relative_degree; ++fall) {
@@ -187,20 +188,29 @@ class Selector {
   }
 
   // Left out, the images of the hold are an error that repeats: up to 3.4 % where the plant falls
-  // as 1/ω, which is far above the scatter and is explained by a pole that is not there.
+  // as 1/ω, which is far above the scatter and is explained by a pole that is not there. Towards
+  // half the rate they are as large as the response, the passes need not settle, and the model
+  // itself takes the hold in.
   void include_images(FitData& data, const FitSetup& setup, const Freedom& freedom,
                       Refined& refined) const {
     const HoldModel hold(settings_.fit.hold_period_s, setup.fixed_and_path);
     const double negligible = setup.data.scatter_known ? settled_images : 0.0;
+    bool settled = false;
     for (int pass = 0;; ++pass) {
       const auto images = hold_images(setup.data, freedom, refined.rational, hold);
       if (!images) break;
       const Eigen::ArrayXcd known = setup.data.known * *images;
-      const bool settled =
-          ((known / data.known - 1.0).abs() <= negligible * setup.data.sigma).all();
+      settled = ((known / data.known - 1.0).abs() <= negligible * setup.data.sigma).all();
       data.known = known;
       if (pass == image_passes || settled) break;
       refined = refine(data, freedom, refined.rational);
+    }
+    if (!settled) {
+      Freedom held = freedom;
+      held.hold = &hold;
+      refined = refine(setup.data, held, refined.rational);
+      if (const auto images = hold_images(setup.data, freedom, refined.rational, hold))
+        data.known = setup.data.known * *images;
     }
     // What the exact model leaves, where the passes ended.
     refined.rational.cost = whitened(data, model_on_grid(data, refined.rational)).squaredNorm();
