@@ -17,9 +17,10 @@ using Eigen::MatrixXcd;
 using Eigen::VectorXcd;
 using Eigen::VectorXd;
 
-// Distance of two poles, over their size or the first frequency, below which double partial
-// fractions lose more than half of the digits: their error grows with its third power.
-constexpr double least_distance = 1e-3;
+// Distance of two poles, over their size or the first frequency, of which the power that the
+// partial fractions grow with leaves half of the digits: the third, of an order more at the origin
+// each one.
+constexpr double half_of_the_digits = 1e-9;
 
 // First terms of a Taylor series at the origin.
 using Series = std::vector<Complex>;
@@ -64,12 +65,16 @@ struct Parts {
   bool apart(double first) const {
     std::vector<Complex> all = poles;
     all.insert(all.end(), given.begin(), given.end());
-    if (at_origin > 0) all.emplace_back(0.0);
-    for (std::size_t i = 0; i < all.size(); ++i)
+    const double between_two = std::pow(half_of_the_digits, 1.0 / 3.0);
+    const double to_origin =
+        at_origin > 0 ? std::pow(half_of_the_digits, 1.0 / (at_origin + 2)) * first : 0.0;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!(std::abs(all[i]) >= to_origin)) return false;
       for (std::size_t k = 0; k < i; ++k) {
         const double size = std::max({std::abs(all[i]), std::abs(all[k]), first});
-        if (!(std::abs(all[i] - all[k]) >= least_distance * size)) return false;
+        if (!(std::abs(all[i] - all[k]) >= between_two * size)) return false;
       }
+    }
     return true;
   }
 

@@ -34,6 +34,9 @@ constexpr int image_passes = 2;
 // Images that change the response by less than this part of its scatter, or of what the trial leaves,
 // have settled.
 constexpr double settled_images = 0.03;
+// Steps with the hold in the model: what a structure of too many parameters gains after them is
+// nothing to choose it by.
+constexpr int held_iterations = 12;
 constexpr std::size_t most_constrained_fits = 8;
 
 class Selector {
@@ -213,7 +216,7 @@ class Selector {
     if (!settled && std::isfinite(refined.rational.cost)) {
       Freedom held = freedom;
       held.hold = &hold;
-      refined = refine(setup.data, held, refined.rational);
+      refined = refine(setup.data, held, refined.rational, held_iterations);
       if (const auto images = hold_images(setup.data, freedom, refined.rational, hold))
         data.known = setup.data.known * *images;
     }
