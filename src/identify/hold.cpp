@@ -5,6 +5,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "identify/sampled_terms.h"
+
 namespace sinerig::identify {
 
 namespace {
@@ -69,23 +71,6 @@ struct StepTransform {
   }
 };
 
-// Σ_{n≥0} t^q/q! z^−n with t = (n + fraction)·T, for q = 0 … 3.
-Complex sampled_power(int q, double fraction, double period, Complex z_inverse) {
-  const Complex one_less = 1.0 - z_inverse;
-  const Complex sum_0 = 1.0 / one_less;
-  if (q == 0) return sum_0;
-  const Complex sum_1 = z_inverse / (one_less * one_less);
-  if (q == 1) return period * (sum_1 + fraction * sum_0);
-  const Complex sum_2 = z_inverse * (1.0 + z_inverse) / (one_less * one_less * one_less);
-  if (q == 2)
-    return period * period / 2.0 * (sum_2 + 2.0 * fraction * sum_1 + fraction * fraction * sum_0);
-  const Complex sum_3 = z_inverse * (1.0 + 4.0 * z_inverse + z_inverse * z_inverse) /
-                        (one_less * one_less * one_less * one_less);
-  return period * period * period / 6.0 *
-         (sum_3 + 3.0 * fraction * sum_2 + 3.0 * fraction * fraction * sum_1 +
-          fraction * fraction * fraction * sum_0);
-}
-
 void check(const ZerosPolesGain& plant, double period_s, const StepTransform& step) {
   if (!(period_s > 0.0) || !std::isfinite(period_s))
     throw std::invalid_argument("hold: a period of " + std::to_string(period_s) +
@@ -98,9 +83,6 @@ void check(const ZerosPolesGain& plant, double period_s, const StepTransform& st
     throw std::invalid_argument("hold: more than three poles at the origin are not supported");
 }
 
-// A delay this close to a whole number of ticks is one: reading it as just above would add a tick.
-constexpr double tick_tolerance = 1e-9;
-
 }  // namespace
 
 std::complex<double> hold_factor(double omega_rad_s, double period_s) {
@@ -112,27 +94,22 @@ Eigen::ArrayXcd held_response(const ZerosPolesGain& plant, double period_s,
                               const Eigen::ArrayXd& omega_rad_s) {
   const StepTransform step(plant);
   check(plant, period_s, step);
-  const double ticks = plant.delay_s / period_s;
-  const double whole_ticks = std::ceil(ticks - tick_tolerance);
-  const double fraction = std::max(whole_ticks - ticks, 0.0);
+  const TickDelay delay(plant.delay_s, period_s);
   const std::vector<Complex> series = step.series_at_origin();
-  std::vector<Complex> start(step.poles.size());
-  std::vector<Complex> per_tick(step.poles.size());
-  for (std::size_t p = 0; p < step.poles.size(); ++p) {
-    start[p] = step.residue(p) * std::exp(step.poles[p] * (fraction * period_s));
-    per_tick[p] = std::exp(step.poles[p] * period_s);
-  }
+  std::vector<Complex> residues(step.poles.size());
+  for (std::size_t p = 0; p < residues.size(); ++p) residues[p] = step.residue(p);
   Eigen::ArrayXcd response(omega_rad_s.size());
   for (Eigen::Index i = 0; i < omega_rad_s.size(); ++i) {
     const Complex z_inverse = std::polar(1.0, -omega_rad_s[i] * period_s);
     Complex sum = 0.0;
-    for (std::size_t p = 0; p < start.size(); ++p)
-      sum += start[p] / (1.0 - per_tick[p] * z_inverse);
+    for (std::size_t p = 0; p < residues.size(); ++p)
+      sum += residues[p] *
+             sampled_exponential(step.poles[p], delay.fraction, period_s, z_inverse).value;
     for (std::size_t j = 0; j < series.size(); ++j) {
       const int q = static_cast<int>(series.size() - 1 - j);
-      sum += series[j] * sampled_power(q, fraction, period_s, z_inverse);
+      sum += series[j] * sampled_power(q, delay.fraction, period_s, z_inverse);
     }
-    const Complex whole_delay = std::polar(1.0, -omega_rad_s[i] * period_s * whole_ticks);
+    const Complex whole_delay = std::polar(1.0, -omega_rad_s[i] * period_s * delay.whole_ticks);
     response[i] = (1.0 - z_inverse) * sum * whole_delay;
   }
   return response;

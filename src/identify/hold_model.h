@@ -1,6 +1,8 @@
 // The exact hold as part of a model whose polynomials are given in orthonormal bases.
 #pragma once
 
+#include <optional>
+
 #include <Eigen/Core>
 
 #include "identify/fit_data.h"
@@ -21,6 +23,13 @@ class HoldModel {
   Eigen::ArrayXcd response(const OrthonormalBasis& N_basis, const Eigen::VectorXd& n,
                            const OrthonormalBasis& D_basis, const Eigen::VectorXd& d,
                            double delay_s, const FitData& data) const;
+  // Of that response by n, d and delay·scale, one column each. Nothing where two poles, or one and
+  // the origin, are so close that their partial fractions cancel.
+  std::optional<Eigen::MatrixXcd> sensitivity(const OrthonormalBasis& N_basis,
+                                              const Eigen::VectorXd& n,
+                                              const OrthonormalBasis& D_basis,
+                                              const Eigen::VectorXd& d, double delay_s,
+                                              const FitData& data) const;
 
  private:
   double period_s_;

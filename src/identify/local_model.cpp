@@ -134,6 +134,17 @@ VectorXd LocalModel::residual(const Parameters& parameters) const {
 
 MatrixXd LocalModel::jacobian() const {
   const Index g = data_.points();
+  if (freedom_.hold) {
+    const auto held = freedom_.hold->sensitivity(N_basis_, parameters_.n, D_basis_, parameters_.d,
+                                                 parameters_.delay_s, data_);
+    if (held) {
+      MatrixXd full(2 * g, held->cols());
+      full.topRows(g) = data_.w_rr.matrix().asDiagonal() * held->real();
+      full.bottomRows(g) = data_.w_ir.matrix().asDiagonal() * held->real();
+      full.bottomRows(g) += data_.w_ii.matrix().asDiagonal() * held->imag();
+      return full * spread_to_full();
+    }
+  }
   const ArrayXcd D = D_basis_.on_grid(parameters_.d);
   const ArrayXcd model = response(parameters_);
   ArrayXcd by_N = data_.known / D;
@@ -180,7 +191,8 @@ MatrixXd LocalModel::jacobian() const {
 }
 
 // The images of a held response move with the parameters too; the columns above have only the part
-// of the plain response, so the exact ones replace them, by central differences.
+// of the plain response, so the exact ones replace them, by central differences: for poles that are
+// too close for their sensitivity in closed form.
 void LocalModel::add_hold_sensitivity(MatrixXd& J) const {
   // With columns of size one, the rounding of the residual (1e-13 of its scale) over the step and
   // the curvature times the step squared balance near 1e-4. The scale is that of H over its

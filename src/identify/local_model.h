@@ -47,6 +47,9 @@ class LocalModel {
   const OrthonormalBasis& N_basis() const { return N_basis_; }
   const OrthonormalBasis& D_basis() const { return D_basis_; }
 
+  // At the current parameters, the hold of the freedom included.
+  Eigen::ArrayXcd response() const { return response(parameters_); }
+
   // Whitened residual, 2g real values; infinite when a constraint on the roots is broken.
   Eigen::VectorXd residual(const Parameters& parameters) const;
 

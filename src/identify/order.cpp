@@ -31,8 +31,12 @@ constexpr int orders_above_the_lowest = 2;
 constexpr int subsets_per_order = 4;
 // The images of the hold are those of the last trial at first, so few passes are left to do.
 constexpr int image_passes = 2;
-// Images that change the response by less than this part of its scatter have settled.
+// Images that change the response by less than this part of its scatter, or of what the trial leaves,
+// have settled.
 constexpr double settled_images = 0.03;
+// Steps with the hold in the model: what a structure of too many parameters gains after them is
+// nothing to choose it by.
+constexpr int held_iterations = 12;
 constexpr std::size_t most_constrained_fits = 8;
 
 class Selector {
@@ -99,12 +103,14 @@ class Selector {
     return false;
   }
 
+  // Of the order below the lowest one the sweep has tried all but as many zeros as poles.
   void sweep_structures() {
+    const int first = std::max(lowest_ - 1, first_order());
     const int last = std::min(lowest_ + orders_above_the_lowest, last_order());
-    for (int poles = lowest_; poles <= last; ++poles)
+    for (int poles = first; poles <= last; ++poles)
       for (int origin = settings_.origin.value_or(0);
            origin <= settings_.origin.value_or(settings_.most_origin); ++origin)
-        for (int fall = 0; fall <= settings_.most_relative_degree; ++fall) {
+        for (int fall = 0; fall <= (poles < lowest_ ? 0 : settings_.most_relative_degree); ++fall) {
           const int zeros = settings_.zeros.value_or(poles - fall);
           const Structure structure{zeros, poles, origin};
           if (!possible(structure) || known(structure)) continue;
@@ -187,20 +193,32 @@ class Selector {
   }
 
   // Left out, the images of the hold are an error that repeats: up to 3.4 % where the plant falls
-  // as 1/ω, which is far above the scatter and is explained by a pole that is not there.
+  // as 1/ω, which is far above the scatter and is explained by a pole that is not there. Towards
+  // half the rate they are as large as the response, the passes need not settle, and the model
+  // itself takes the hold in.
   void include_images(FitData& data, const FitSetup& setup, const Freedom& freedom,
                       Refined& refined) const {
     const HoldModel hold(settings_.fit.hold_period_s, setup.fixed_and_path);
-    const double negligible = setup.data.scatter_known ? settled_images : 0.0;
+    bool settled = false;
     for (int pass = 0;; ++pass) {
       const auto images = hold_images(setup.data, freedom, refined.rational, hold);
       if (!images) break;
       const Eigen::ArrayXcd known = setup.data.known * *images;
-      const bool settled =
-          ((known / data.known - 1.0).abs() <= negligible * setup.data.sigma).all();
+      const Eigen::ArrayXd change = (known / data.known - 1.0).abs();
       data.known = known;
+      refined.rational.cost = whitened(data, model_on_grid(data, refined.rational)).squaredNorm();
+      const double residual = std::sqrt(refined.rational.cost / values());
+      const double error = setup.data.scatter_known ? std::max(residual, 1.0) : residual;
+      settled = (change <= settled_images * error * setup.data.sigma).all();
       if (pass == image_passes || settled) break;
       refined = refine(data, freedom, refined.rational);
+    }
+    if (!settled && std::isfinite(refined.rational.cost)) {
+      Freedom held = freedom;
+      held.hold = &hold;
+      refined = refine(setup.data, held, refined.rational, held_iterations);
+      if (const auto images = hold_images(setup.data, freedom, refined.rational, hold))
+        data.known = setup.data.known * *images;
     }
     // What the exact model leaves, where the passes ended.
     refined.rational.cost = whitened(data, model_on_grid(data, refined.rational)).squaredNorm();

@@ -62,6 +62,18 @@ Eigen::VectorXcd OrthonormalBasis::all_at(Complex s) const {
   return P;
 }
 
+Eigen::VectorXcd OrthonormalBasis::all_slopes_at(Complex s) const {
+  const Eigen::VectorXcd P = all_at(s);
+  Eigen::VectorXcd slope(degree() + 1);
+  slope[0] = 0.0;
+  for (Index k = 0; k < degree(); ++k) {
+    Complex next = P[k] + s * slope[k];
+    for (Index l = (k + 1) % 2; l <= k; l += 2) next -= hessenberg_(l, k) * slope[l];
+    slope[k + 1] = next / hessenberg_(k + 1, k);
+  }
+  return slope;
+}
+
 OrthonormalBasis::Value OrthonormalBasis::at(const Eigen::VectorXd& coefficients, Complex s) const {
   const Index terms = coefficients.size();
   Eigen::VectorXcd P(terms);

@@ -35,6 +35,9 @@ class OrthonormalBasis {
   // All P_k at any scaled s.
   Eigen::VectorXcd all_at(std::complex<double> s) const;
 
+  // Their derivatives there.
+  Eigen::VectorXcd all_slopes_at(std::complex<double> s) const;
+
   // Row k: the coefficients of P_k in ascending powers of scaled s.
   Eigen::MatrixXd power_coefficients() const;
 

@@ -121,36 +121,18 @@ std::vector<Index> inside(const ArrayXd& squared, double limit) {
   return kept;
 }
 
-GridRational at_points(const GridRational& rational, const std::vector<Index>& points) {
-  return {rational.N(points), rational.D(points), rational.cost, rational.delay_s};
-}
-
-// The polynomials fitted on some points, at all points.
-GridRational extended(const FitData& part, const Freedom& freedom, const GridRational& rational,
-                      const FitData& all) {
-  const LocalModel model(part, freedom, rational);
-  GridRational full;
-  full.delay_s = rational.delay_s;
-  full.N.resize(all.points());
-  full.D.resize(all.points());
-  for (Index i = 0; i < all.points(); ++i) {
-    const std::complex<double> s{0.0, all.x[i]};
-    full.N[i] = model.N_basis().at(model.parameters().n, s).value;
-    full.D[i] = model.D_basis().at(model.parameters().d, s).value;
-  }
-  return full;
-}
-
 bool isolated(const std::vector<Index>& outliers) {
   for (std::size_t i = 2; i < outliers.size(); ++i)
     if (outliers[i] == outliers[i - 2] + 2) return false;
   return true;
 }
 
+std::size_t least_kept(const FitData& data) {
+  return static_cast<std::size_t>((1.0 - most_rejected) * static_cast<double>(data.points()));
+}
+
 std::optional<RobustFit> settle(const FitData& data, const Freedom& freedom,
                                 const Candidate& start) {
-  const auto least_kept =
-      static_cast<std::size_t>((1.0 - most_rejected) * static_cast<double>(data.points()));
   RobustFit fit;
   GridRational rational = start.rational;
   ArrayXd squared = start.squared;
@@ -160,17 +142,16 @@ std::optional<RobustFit> settle(const FitData& data, const Freedom& freedom,
     if (!squared.allFinite()) return {};
     auto kept = inside(squared, rejection_limit(data, squared) * widening);
     const bool settled = round > 0 && widening == 1.0 && kept == fit.kept;
-    if (settled || kept.size() < least_kept) break;
+    if (settled || kept.size() < least_kept(data)) break;
     fit.kept = kept;
     const FitData part = data.subset(kept);
     fit.refined = refine(part, freedom, at_points(rational, kept));
-    rational = extended(part, freedom, fit.refined.rational, data);
+    rational = at_all_points(part, freedom, fit.refined.rational, data);
     squared = residual_of(data, rational);
     widening = 1.0;
   }
-  if (fit.kept.size() < least_kept) return {};
-  for (Index i = 0; i < data.points(); ++i)
-    if (!std::binary_search(fit.kept.begin(), fit.kept.end(), i)) fit.outliers.push_back(i);
+  if (fit.kept.size() < least_kept(data)) return {};
+  fit.outliers = points_left_out(data, fit.kept);
   if (fit.outliers.empty() || !isolated(fit.outliers)) return {};
   const FitData part = data.subset(fit.kept);
   if (data.scatter_known && !explained_by_noise(part, freedom, fit.refined.rational.cost, 3.0))
@@ -194,10 +175,23 @@ std::optional<Candidate> from_random_subset(const FitData& data, const Freedom& 
   const Refined refined = search(part, freedom, settings);
   if (!std::isfinite(refined.rational.cost)) return {};
   Candidate candidate;
-  candidate.rational = extended(part, freedom, refined.rational, data);
+  candidate.rational = at_all_points(part, freedom, refined.rational, data);
   candidate.squared = residual_of(data, candidate.rational);
   if (!candidate.squared.allFinite()) return {};
   return candidate;
+}
+
+double per_degree_of_freedom(double cost, std::size_t points, const Freedom& freedom) {
+  return cost / std::max(static_cast<double>(2 * points) - freedom.parameters(), 1.0);
+}
+
+double per_degree_of_freedom(const RobustFit& fit, const Freedom& freedom) {
+  return per_degree_of_freedom(fit.refined.rational.cost, fit.kept.size(), freedom);
+}
+
+double penalised(const RobustFit& fit, const FitData& data, double variance) {
+  return fit.refined.rational.cost / variance +
+         cost_of_outlier(data) * static_cast<double>(fit.outliers.size());
 }
 
 // A point left out costs what the threshold is worth, so of two explanations the one with fewer
@@ -205,20 +199,14 @@ std::optional<Candidate> from_random_subset(const FitData& data, const Freedom& 
 std::optional<RobustFit> least_penalised(const std::vector<RobustFit>& fits, const FitData& data,
                                          const Freedom& freedom) {
   double variance = data.scatter_known ? 1.0 : std::numeric_limits<double>::infinity();
-  const auto per_value = [&](const RobustFit& fit) {
-    const auto values = static_cast<double>(2 * fit.kept.size());
-    return fit.refined.rational.cost / std::max(values - freedom.parameters(), 1.0);
-  };
   if (!data.scatter_known)
-    for (const RobustFit& fit : fits) variance = std::min(variance, per_value(fit));
+    for (const RobustFit& fit : fits)
+      variance = std::min(variance, per_degree_of_freedom(fit, freedom));
   variance = std::max(variance, 1e-24);
-  const double limit = cost_of_outlier(data);
-  const auto penalised = [&](const RobustFit& fit) {
-    return fit.refined.rational.cost / variance + limit * static_cast<double>(fit.outliers.size());
-  };
-  const auto best = std::min_element(
-      fits.begin(), fits.end(),
-      [&](const RobustFit& a, const RobustFit& b) { return penalised(a) < penalised(b); });
+  const auto best =
+      std::min_element(fits.begin(), fits.end(), [&](const RobustFit& a, const RobustFit& b) {
+        return penalised(a, data, variance) < penalised(b, data, variance);
+      });
   if (best == fits.end()) return {};
   return *best;
 }
@@ -234,9 +222,54 @@ double cost_of_outlier(const FitData& data) {
   return 2.0 * std::log(static_cast<double>(data.points()) / false_alarm);
 }
 
+GridRational at_points(const GridRational& rational, const std::vector<Index>& points) {
+  return {rational.N(points), rational.D(points), rational.cost, rational.delay_s};
+}
+
+GridRational at_all_points(const FitData& part, const Freedom& freedom,
+                           const GridRational& rational, const FitData& all) {
+  const LocalModel model(part, freedom, rational);
+  GridRational full;
+  full.delay_s = rational.delay_s;
+  full.N.resize(all.points());
+  full.D.resize(all.points());
+  for (Index i = 0; i < all.points(); ++i) {
+    const std::complex<double> s{0.0, all.x[i]};
+    full.N[i] = model.N_basis().at(model.parameters().n, s).value;
+    full.D[i] = model.D_basis().at(model.parameters().d, s).value;
+  }
+  return full;
+}
+
 bool outliers_suspected(const FitData& data, const VectorXd& residual) {
   const ArrayXd squared = squared_residuals(data, residual);
   return squared.maxCoeff() > rejection_limit(data, squared);
+}
+
+std::vector<Index> points_left_out(const FitData& data, const std::vector<Index>& kept) {
+  std::vector<Index> left_out;
+  for (Index i = 0; i < data.points(); ++i)
+    if (!std::binary_search(kept.begin(), kept.end(), i)) left_out.push_back(i);
+  return left_out;
+}
+
+std::optional<std::vector<Index>> acceptable_points(const FitData& data, const VectorXd& residual) {
+  const ArrayXd squared = squared_residuals(data, residual);
+  const std::vector<Index> kept = inside(squared, rejection_limit(data, squared));
+  if (kept.size() < least_kept(data) || !isolated(points_left_out(data, kept))) return {};
+  return kept;
+}
+
+bool explains_better(const RobustFit& robust, const Refined& of_all, const FitData& data,
+                     const Freedom& freedom) {
+  const double cost = of_all.rational.cost;
+  double variance = 1.0;
+  if (!data.scatter_known)
+    variance =
+        std::min(per_degree_of_freedom(robust, freedom),
+                 per_degree_of_freedom(cost, robust.kept.size() + robust.outliers.size(), freedom));
+  variance = std::max(variance, 1e-24);
+  return penalised(robust, data, variance) < cost / variance;
 }
 
 std::optional<RobustFit> fit_robustly(const FitData& data, const Freedom& freedom,

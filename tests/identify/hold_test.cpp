@@ -4,8 +4,10 @@
 #include <numbers>
 #include <stdexcept>
 
+#include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "identify/hold_model.h"
 #include "plants.h"
 
 namespace sinerig::identify {
@@ -81,6 +83,77 @@ TEST(Hold, DividedOutLeavesTheStatedErrorBelowATenthOfTheRate) {
   EXPECT_LE(error({{}, {0.0}, 1.0, 0.0}), 0.034);
   EXPECT_LE(error({{}, {0.0, 0.0}, 1.0, 0.0}), 0.0034);
   EXPECT_LE(error({{}, {0.0, 0.0, 0.0}, 1.0, 0.0}), 0.0004);
+}
+
+// exp(p·T) of a fast growing pole is beyond any number; the response is not.
+TEST(Hold, IsFiniteForAnyPole) {
+  for (const double pole : {-1e9, -1e5, 1e5, 1e9})
+    for (const double delay_s : {0.0, 0.04, 0.3}) {
+      const ZerosPolesGain plant{{}, {-3.0, pole}, 3.0 * std::abs(pole), delay_s};
+      for (const double omega : {0.5, 5.0, 30.0}) {
+        const Complex held = held_at(plant, 0.1, omega);
+        ASSERT_TRUE(std::isfinite(std::abs(held))) << pole;
+        ZerosPolesGain slow{{}, {-3.0}, pole < 0.0 ? 3.0 : -3.0, delay_s};
+        EXPECT_LT(std::abs(held / held_at(slow, 0.1, omega) - 1.0), 1e-3) << pole << ' ' << delay_s;
+      }
+    }
+}
+
+// Each column of the sensitivity against a central difference of the response.
+TEST(Hold, HasItsSensitivityInClosedForm) {
+  const double period_s = 1e-3;
+  const auto grid = log_grid(2.0 * std::numbers::pi, 2.0 * std::numbers::pi * 450.0, 40);
+  FitData data;
+  data.omega = Eigen::Map<const Eigen::ArrayXd>(grid.data(), 40);
+  data.scale = std::sqrt(grid.front() * grid.back());
+  data.x = data.omega / data.scale;
+  const Eigen::ArrayXd weight = Eigen::ArrayXd::Ones(40);
+  const OrthonormalBasis N_basis(data.x, weight, 2);
+  const OrthonormalBasis D_basis(data.x, weight, 3);
+  const Eigen::VectorXd n = Eigen::Vector3d(1.0, -0.4, 0.3);
+  for (const double last : {0.2, -0.3}) {  // without and with a pole that grows
+    const Eigen::VectorXd d = Eigen::Vector4d(0.8, 0.5, 0.7, last);
+    for (const ZerosPolesGain& fixed :
+         {ZerosPolesGain{{}, {}, 1.0, 0.0}, ZerosPolesGain{{}, {0.0}, 2.0, 0.3e-3},
+          ZerosPolesGain{{}, {0.0, 0.0, -300.0}, -5.0, 2.4e-3},
+          ZerosPolesGain{{0.0}, {-2000.0}, 1.0, 0.0},
+          ZerosPolesGain{{0.0, 0.0}, {-2000.0, -500.0}, 1.0, 0.0}}) {
+      const HoldModel hold(period_s, fixed);
+      const double delay_s = 0.25e-3;
+      const auto closed = hold.sensitivity(N_basis, n, D_basis, d, delay_s, data);
+      ASSERT_TRUE(closed);
+      for (Eigen::Index column = 0; column < 8; ++column) {
+        const auto moved = [&](double by) {
+          Eigen::VectorXd n_moved = n;
+          Eigen::VectorXd d_moved = d;
+          if (column < 3) n_moved[column] += by;
+          if (column >= 3 && column < 7) d_moved[column - 3] += by;
+          return hold.response(N_basis, n_moved, D_basis, d_moved,
+                               delay_s + (column == 7 ? by / data.scale : 0.0), data);
+        };
+        const Eigen::ArrayXcd difference = (moved(1e-6) - moved(-1e-6)) / 2e-6;
+        EXPECT_LT((closed->col(column).array() - difference).abs().maxCoeff(),
+                  1e-6 * difference.abs().maxCoeff())
+            << "column " << column << ", " << fixed.poles.size() << " poles given, " << last;
+      }
+    }
+  }
+}
+
+TEST(Hold, LeavesSensitivityToDifferencesWherePolesMeet) {
+  const auto grid = log_grid(1.0, 100.0, 20);
+  FitData data;
+  data.omega = Eigen::Map<const Eigen::ArrayXd>(grid.data(), 20);
+  data.scale = 10.0;
+  data.x = data.omega / data.scale;
+  const OrthonormalBasis basis(data.x, Eigen::ArrayXd::Ones(20), 1);
+  const Eigen::VectorXd d =
+      basis.power_coefficients().transpose().inverse() * Eigen::Vector2d(1.0, 1.0);  // 1 + x
+  const Eigen::VectorXd one = Eigen::VectorXd::Unit(2, 0);
+  EXPECT_TRUE(
+      HoldModel(0.01, {{}, {-11.0}, 1.0, 0.0}).sensitivity(basis, one, basis, d, 0.0, data));
+  EXPECT_FALSE(
+      HoldModel(0.01, {{}, {-10.001}, 1.0, 0.0}).sensitivity(basis, one, basis, d, 0.0, data));
 }
 
 TEST(Hold, RefusesWhatCannotBeHeld) {

@@ -134,6 +134,85 @@ TEST(MaximumLikelihood, GivesTheContinuousPlantBehindHoldAndPath) {
   EXPECT_NEAR(fit.delay_s.value, 1.5e-3, 1e-9);
 }
 
+// The images of the hold are no outliers, and do not hide those that are.
+TEST(MaximumLikelihood, JudgesPointsByTheModelBehindItsHold) {
+  const double period_s = 1e-3;
+  int number = 0;
+  for (const ZerosPolesGain& plant : plain_plants()) {
+    ++number;
+    for (const double top_hz : {150.0, 200.0, 400.0}) {
+      const auto grid = log_grid(2.0 * std::numbers::pi * 0.5, 2.0 * std::numbers::pi * top_hz, 60);
+      for (unsigned seed = 1; seed <= 4; ++seed) {
+        SCOPED_TRACE("plant " + std::to_string(number) + " to " + std::to_string(top_hz) +
+                     " Hz, seed " + std::to_string(seed));
+        Random random(seed);
+        Response response = noisy_behind_hold(plant, period_s, grid, 1e-3, random);
+        FitOptions options = options_for(plant, Delay::fit);
+        options.hold_period_s = period_s;
+        const Fit fit = fit_maximum_likelihood(response, options);
+        EXPECT_THAT(fit.outliers, testing::IsEmpty());
+        for (const std::size_t i : {20U, 50U}) response[i].response *= Complex(1.1, 0.1);
+        const Fit with_outliers = fit_maximum_likelihood(response, options);
+        EXPECT_THAT(with_outliers.outliers, testing::ElementsAre(20U, 50U));
+        EXPECT_LT(gain_error(with_outliers.zpk, plant, grid).rms_db, 0.01);
+      }
+    }
+  }
+}
+
+// Without scatter a search that ends short of the minimum leaves residuals that stand out; they are
+// no outliers, and to leave their points out makes the fit worse.
+TEST(MaximumLikelihood, KeepsGoodPointsWithoutKnowingTheScatter) {
+  const double turn = 2.0 * std::numbers::pi;
+  const auto pair = [&](Complex s, double frequency_hz) {
+    const Complex x = s / (turn * frequency_hz);
+    return 1.0 / (x * x + 0.02 * x + 1.0);
+  };
+  const auto close_pair = [&](Complex s) {
+    return pair(s, 10.0) + pair(s, 10.3);
+  };
+  const auto leads = [&](Complex s) {
+    const Complex lead = 1.0 + s / (turn * 3.0);
+    const Complex lag = 1.0 + s / (turn * 200.0);
+    return lead * lead / (lag * lag * s);
+  };
+  const auto fit_of = [](const auto& plant, const std::vector<double>& grid, FitOptions options,
+                         unsigned seed) {
+    Random random(seed);
+    std::normal_distribution<double> normal(0.0, 0.01);
+    Response response;
+    for (const double omega : grid) {
+      const double re = normal(random);
+      const double im = normal(random);
+      response.push_back({omega, plant(Complex{0.0, omega}) * Complex{1.0 + re, im}, 0, 0, 0});
+    }
+    return fit_maximum_likelihood(response, options);
+  };
+  FitOptions options;
+  options.delay = Delay::fit;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    options.poles = 4;
+    options.zeros = 2;
+    options.origin = 0;
+    const Fit pair_fit = fit_of(close_pair, log_grid(turn, turn * 100.0, 100), options, seed);
+    EXPECT_THAT(pair_fit.outliers, testing::IsEmpty()) << "close pair, seed " << seed;
+    options.poles = 3;
+    options.origin = 1;
+    const Fit lead_fit = fit_of(leads, log_grid(turn * 0.1, turn * 300.0, 60), options, seed);
+    EXPECT_THAT(lead_fit.outliers, testing::IsEmpty()) << "leads, seed " << seed;
+  }
+}
+
+TEST(MaximumLikelihood, FindsOutliersWithoutKnowingTheScatter) {
+  Random random(6);
+  Response response = noisy_response(gimbal_b(), gimbal_grid(), 0.01, random);
+  for (const std::size_t i : {20U, 55U, 80U}) response[i].response *= Complex(2.0, 1.0);
+  for (ResponsePoint& point : response) point.variance_re = point.variance_im = 0.0;
+  const Fit fit = fit_maximum_likelihood(response, options_for(gimbal_b(), Delay::fit));
+  EXPECT_THAT(fit.outliers, testing::ElementsAre(20U, 55U, 80U));
+  EXPECT_LT(gain_error(fit.zpk, gimbal_b(), gimbal_grid()).rms_db, 0.05);
+}
+
 TEST(MaximumLikelihood, KeepsWhatIsFixed) {
   Random random(8);
   const Response response = noisy_response(gimbal_b(), gimbal_grid(), 0.01, random);

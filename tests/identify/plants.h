@@ -9,6 +9,7 @@
 #include <random>
 #include <vector>
 
+#include "identify/hold.h"
 #include "identify/response.h"
 #include "identify/transfer_function.h"
 
@@ -48,6 +49,26 @@ Response noisy_response(const Model& plant, const std::vector<double>& omega_rad
     const double phase = normal(random);
     const std::complex<double> measured = plant.at(omega) * gain * std::polar(1.0, phase);
     response.push_back(point_with_relative_scatter(omega, measured, sigma));
+  }
+  return response;
+}
+
+// The same of the real and the imaginary part, measured behind a zero-order hold.
+template <typename Random>
+Response noisy_behind_hold(const ZerosPolesGain& plant, double period_s,
+                           const std::vector<double>& omega_rad_s, double sigma, Random& random) {
+  std::normal_distribution<double> normal(0.0, sigma);
+  const Eigen::ArrayXcd held =
+      held_response(plant, period_s,
+                    Eigen::Map<const Eigen::ArrayXd>(
+                        omega_rad_s.data(), static_cast<Eigen::Index>(omega_rad_s.size())));
+  Response response;
+  for (std::size_t i = 0; i < omega_rad_s.size(); ++i) {
+    const double re = normal(random);
+    const double im = normal(random);
+    response.push_back(point_with_relative_scatter(
+        omega_rad_s[i], held[static_cast<Eigen::Index>(i)] * std::complex<double>(1.0 + re, im),
+        sigma));
   }
   return response;
 }
@@ -144,6 +165,19 @@ ZerosPolesGain wide_plant(int pairs, Random& random) {
 }
 inline std::vector<double> wide_grid() {
   return log_grid(2.0 * std::numbers::pi * 0.1, 2.0 * std::numbers::pi * 1000.0, 400);
+}
+
+// Of low order: their images near half the rate of a hold are as large as they are themselves.
+inline std::vector<ZerosPolesGain> plain_plants() {
+  constexpr double turn = 2.0 * std::numbers::pi;
+  std::vector<ZerosPolesGain> plants{{{}, {0.0}, 1.0, 0.0},
+                                     {{}, {-5.0 * turn}, 5.0 * turn, 0.0},
+                                     {{}, {0.0, -5.0 * turn}, 500.0 * turn, 0.0},
+                                     {{}, {0.0, 0.0}, 100.0, 0.0},
+                                     {{}, {}, 1.0, 0.0}};
+  add_pair(plants.back().poles, 40.0, 0.02);
+  set_static_gain(plants.back(), 1.0);
+  return plants;
 }
 
 // Gain error in dB between a model and the true plant over a grid.
