@@ -2,6 +2,17 @@
 set(SINERIG_PAGE_SCRIPTS format scale state plot pointer plane tables histogram figures loop main)
 set(SINERIG_PAGE_STYLES theme page plot table media)
 
+# sinerig_join_texts(OUT file …) : as EmbedText.cmake reads them.
+function(sinerig_join_texts out)
+  set(names "")
+  foreach(file IN LISTS ARGN)
+    file(RELATIVE_PATH name "${PROJECT_SOURCE_DIR}" "${file}")
+    list(APPEND names "${name}")
+  endforeach()
+  list(JOIN names "+" joined)
+  set(${out} "${joined}" PARENT_SCOPE)
+endfunction()
+
 # sinerig_embed_page(HEADER h NAMESPACE n TEMPLATE file [SCRIPTS file …] [STYLES file …])
 # Embeds a page in ${CMAKE_CURRENT_BINARY_DIR}/page.cpp: the template, and the report's scripts and
 # styles with those given behind them.
@@ -18,8 +29,9 @@ function(sinerig_embed_page)
   endforeach()
   list(APPEND scripts ${arg_SCRIPTS})
   list(APPEND styles ${arg_STYLES})
-  list(JOIN scripts "+" joined_scripts)
-  list(JOIN styles "+" joined_styles)
+  sinerig_join_texts(joined_template "${arg_TEMPLATE}")
+  sinerig_join_texts(joined_scripts ${scripts})
+  sinerig_join_texts(joined_styles ${styles})
   set(page "${CMAKE_CURRENT_BINARY_DIR}/page.cpp")
   set(embed "${PROJECT_SOURCE_DIR}/cmake/EmbedText.cmake")
   # Scripts are longer than what a compiler must take in one literal; both take it.
@@ -28,7 +40,8 @@ function(sinerig_embed_page)
     OUTPUT "${page}"
     COMMAND ${CMAKE_COMMAND}
       -D "OUTPUT=${page}" -D "HEADER=${arg_HEADER}" -D "NAMESPACE=${arg_NAMESPACE}"
-      -D "TEXTS=page_template:${arg_TEMPLATE},page_style:${joined_styles},page_script:${joined_scripts}"
+      -D "ROOT=${PROJECT_SOURCE_DIR}"
+      -D "TEXTS=page_template:${joined_template},page_style:${joined_styles},page_script:${joined_scripts}"
       -P "${embed}"
     DEPENDS "${arg_TEMPLATE}" ${styles} ${scripts} "${embed}"
     COMMENT "Embedding the page of ${arg_NAMESPACE}"

@@ -35,6 +35,8 @@ misuse() {
   exit 2
 }
 
+newly_installed=
+
 # need PACKAGE… : installs what is missing, as root or through sudo; otherwise prints the line to run and stops.
 need() {
   if ! command -v dpkg-query >/dev/null; then
@@ -75,14 +77,20 @@ need() {
     exit 1
   fi
   rm -f "$log"
+  newly_installed=yes
 }
 
-# configure PRESET : once, and again when the presets have changed.
+# configure PRESET : once, again when the presets have changed or need() has installed something, which may be
+# what was not found then, and from the beginning in a tree that was copied or moved, which builds the other.
 configure() {
-  local tree="$root/build/$1"
-  if [ ! -f "$tree/build.ninja" ] || [ "$root/CMakePresets.json" -nt "$tree/CMakeCache.txt" ]; then
-    (cd "$root" && cmake --preset "$1" >&2)
+  local tree="$root/build/$1" fresh=()
+  if [ -f "$tree/CMakeCache.txt" ] && ! grep -qxF "CMAKE_HOME_DIRECTORY:INTERNAL=$root" "$tree/CMakeCache.txt"; then
+    fresh=(--fresh)
+  elif [ -f "$tree/build.ninja" ] && [ -z "$newly_installed" ] &&
+    [ ! "$root/CMakePresets.json" -nt "$tree/CMakeCache.txt" ]; then
+    return
   fi
+  (cd "$root" && cmake --preset "$1" "${fresh[@]}" >&2)
 }
 
 # build PRESET [TARGET] : builds what changed.

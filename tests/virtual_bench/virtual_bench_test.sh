@@ -29,5 +29,13 @@ latest=$(sed -n 's/^latest //p' "$out/first")
 # A timer is set at least 500 ns ahead; reading the clock costs 4 ns of virtual time.
 [ "$latest" -lt 1000 ] || fail "a cycle was $latest ns late in virtual time"
 
+# Whatever the folders are called that it lies in, is called from and keeps its own files in.
+odd="$out/a folder"
+mkdir -p "$odd/tools" "$odd/tmp"
+cp -r "$(dirname "$bench")/." "$odd/tools/"
+(cd "$odd" && TMPDIR="$odd/tmp" "$odd/tools/virtual-bench" pwd) >"$out/1" 2>"$out/2" ||
+  fail "in a folder with a blank: $(cat "$out/2")"
+[ "$(cat "$out/1")" = "$odd" ] || fail "the command ran in $(cat "$out/1"), not in $odd"
+
 "$bench" --timeout 300 sleep 10000 || fail "10000 s of virtual time must fit in 300 s of real time"
 echo "latest wake-up $latest ns after its deadline, the same in both runs"
