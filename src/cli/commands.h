@@ -33,6 +33,7 @@ struct RunOptions {
   std::string rig;
   std::string output;  // empty: NAME.sweep of the rig file, numbered when it exists
   bool force = false;
+  bool resume = false;                    // the last sweep of the rig, where it ended early
   bool report = true;                     // write NAME.html at the end
   Voice voice = Voice::text;              // json: one object per line, plan, points, end
   std::optional<std::string> serve = {};  // ADDR:PORT of the live page; empty: the default

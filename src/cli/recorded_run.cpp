@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <functional>
 #include <mutex>
 #include <thread>
 
@@ -53,6 +54,7 @@ class PointInbox {
 struct Audience {
   RunTeller& teller;
   ServiceNotifier& service;
+  std::function<void()> at_rest;  // the loop has ended, its last points are still to be written
   LiveView* view;
   record::Recorder::Samples samples;
   double tick_s;  // of a loop in real time; 0 in virtual time
@@ -102,18 +104,23 @@ Played play(const SweepPlan& plan, realtime::LoopThread& loop, SweepRunner& runn
   const EndOfLoop end_of_loop{loop, control};
   const auto tell = [&] {
     for (const Point& point : inbox.take()) audience.teller.point(point);
+    audience.teller.update(control.dwell.load(), control.tick.load());
+  };
+  const auto tell_service = [&] {
     const std::uint32_t dwell = control.dwell.load();
     const std::uint64_t tick = control.tick.load();
-    audience.teller.update(dwell, tick);
     audience.service.progress(tick, std::chrono::steady_clock::now());
     time.update(dwell, tick);
     audience.service.status(status_text(plan, dwell, time));
   };
   while (!done.load()) {
     tell();
+    tell_service();
     std::this_thread::sleep_for(progress_interval);
   }
   loop.join();
+  tell_service();
+  audience.at_rest();
   try {
     recorder.finish();
   } catch (const record::SweepFileError& error) {
@@ -281,23 +288,26 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
     writer->discard();
     throw;
   }
+  // No tick feeds the watchdog any more, and a slow disk may take its time.
+  const auto at_rest = [&] {
+    service.ready();  // where nothing was left to measure: an end before that counts as a failure
+    own_service ? service.stopping() : service.idle(std::chrono::steady_clock::now());
+  };
   Played played;
   if (to_measure) {
     const bool keep_samples = rig.runner.record_samples || !view;
     played = play(plan, *loop, *runner, control, outbox, *writer,
                   {.teller = teller,
                    .service = service,
+                   .at_rest = at_rest,
                    .view = view.get(),
                    .samples = keep_samples ? record::Recorder::Samples::written
                                            : record::Recorder::Samples::watched,
                    .tick_s = in_real_time ? clock.grid().period_s() : 0.0});
+  } else {
+    at_rest();
   }
 
-  if (own_service) {
-    service.stopping();
-  } else {
-    service.idle(std::chrono::steady_clock::now());
-  }
   RunEnd end{.outcome = played.disk_failure.empty() ? outcome_name(played.outcome) : "stopped",
              .reason = reason_of(played, outbox, configured),
              .sweep_file = writer->path(),

@@ -79,7 +79,13 @@ CLI::App* add_run(CLI::App& app, RunOptions& options) {
   run->add_option(
       "-o,--output", options.output,
       "sweep file to write (default: RIG's name + .sweep, here; numbered when it exists)");
-  run->add_flag("--force", options.force, "replace the sweep file if it exists");
+  CLI::Option* force =
+      run->add_flag("--force", options.force, "replace the sweep file if it exists");
+  run->add_flag(
+         "--resume", options.resume,
+         "go on with the last sweep of RIG where that was interrupted, stopped or killed and "
+         "RIG is as it was then; begin a new one otherwise")
+      ->excludes(force);
   add_telling(*run, options);
   return run;
 }

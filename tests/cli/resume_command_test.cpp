@@ -201,5 +201,79 @@ TEST_F(Resume, ADiskThatIsTooSlowStopsTheRun) {
   EXPECT_EQ(record::read_sweep(path("run.sweep")).fact("outcome"), "stopped");
 }
 
+// `sinerig run --resume`: what a service manager calls again and again.
+class RunOrResume : public Resume {
+ protected:
+  void unfinished(const std::string& name) const {
+    record::Database{path(name), record::Database::Mode::write}.execute(
+        "DELETE FROM timing WHERE dwell = (SELECT max(dwell) FROM timing); "
+        "UPDATE part SET outcome = NULL; DELETE FROM run WHERE key = 'outcome'");
+  }
+};
+
+TEST_F(RunOrResume, GoesOnWithTheLastSweepOnlyWhereThatEndedEarly) {
+  write("rig.toml", rig("", "4"));
+  ASSERT_EQ(run({"run", "rig.toml", "--resume", "--no-report"}).code, 0);
+  unfinished("rig.sweep");
+  const auto resumed = run({"run", "rig.toml", "--resume", "--no-report"});
+  EXPECT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("rig.sweep: 2 of 3 dwells are finished, 1 to go"));
+  EXPECT_EQ(record::read_sweep(path("rig.sweep")).parts.size(), 2U);
+  EXPECT_FALSE(fs::exists(path("rig-2.sweep")));
+
+  EXPECT_EQ(run({"run", "rig.toml", "--resume", "--no-report"}).code, 0);
+  EXPECT_EQ(record::read_sweep(path("rig.sweep")).parts.size(), 2U);
+  EXPECT_EQ(record::read_sweep(path("rig-2.sweep")).fact("outcome"), "done");
+}
+
+TEST_F(RunOrResume, TheLastIsTheOneWithTheHighestNumber) {
+  write("rig.toml", rig("", "4"));
+  for (const char* name : {"rig.sweep", "rig-9.sweep", "rig-10.sweep", "rig-11x.sweep",
+                           "rig-.sweep", "rigid-20.sweep", "rig-12.html"}) {
+    ASSERT_EQ(run({"run", "rig.toml", "-o", name, "--no-report"}).code, 0);
+    unfinished(name);
+  }
+  ASSERT_EQ(run({"run", "rig.toml", "--resume", "--no-report"}).code, 0);
+  EXPECT_EQ(record::read_sweep(path("rig-10.sweep")).fact("outcome"), "done");
+  EXPECT_EQ(record::read_sweep(path("rig-9.sweep")).fact("outcome"), "");
+}
+
+TEST_F(RunOrResume, BeginsAnewWhereTheRigFileIsAnother) {
+  write("rig.toml", rig("", "4"));
+  ASSERT_EQ(run({"run", "rig.toml", "--no-report"}).code, 0);
+  unfinished("rig.sweep");
+  write("rig.toml", rig("", "9"));
+  const auto anew = run({"run", "rig.toml", "--resume", "--no-report"});
+  EXPECT_EQ(anew.code, 0) << anew.err;
+  EXPECT_THAT(anew.err,
+              HasSubstr("rig.sweep is not finished, but rig.toml has changed since: a new sweep "
+                        "begins"));
+  EXPECT_EQ(record::read_sweep(path("rig.sweep")).fact("outcome"), "");
+  EXPECT_EQ(record::read_sweep(path("rig-2.sweep")).fact("rig_text"), rig("", "9"));
+}
+
+TEST_F(RunOrResume, BeginsAnewWhereNothingCanBeResumed) {
+  write("rig.toml", rig("", "4"));
+  write("rig.sweep", "");  // of a run that was killed before it began
+  EXPECT_EQ(run({"run", "rig.toml", "--resume", "--no-report"}).code, 0);
+  write("rig-3.sweep", std::string(2000, 'x'));
+  const auto anew = run({"run", "rig.toml", "--resume", "--no-report"});
+  EXPECT_EQ(anew.code, 0);
+  EXPECT_THAT(anew.err, HasSubstr("; a new sweep begins"));
+  EXPECT_EQ(record::read_sweep(path("rig-4.sweep")).fact("outcome"), "done");
+}
+
+TEST_F(RunOrResume, RefusesWhereThatSweepStillGoesOn) {
+  write("rig.toml", rig("clock = \"monotonic\"", "100"));
+  test::Program program{{"run", "rig.toml", "--json", "--resume"}, folder_};
+  program.read_line();
+  program.read_line();  // a point: it runs
+  const auto second = run({"run", "rig.toml", "--resume"});
+  EXPECT_EQ(second.code, 2);
+  EXPECT_THAT(second.err, HasSubstr("rig.sweep: is being written by a sinerig that still runs"));
+  EXPECT_FALSE(fs::exists(path("rig-2.sweep")));
+  EXPECT_EQ(run({"run", "rig.toml", "--resume", "--force"}).code, 2);
+}
+
 }  // namespace
 }  // namespace sinerig

@@ -12,6 +12,7 @@
 #include <sys/un.h>
 
 #include "cli/service_notifier.h"
+#include "record/database.h"
 #include "support/process.h"
 
 namespace sinerig {
@@ -153,6 +154,24 @@ TEST_F(Service, IsToldWhereARunIsUntilItIsStopped) {
   program.send(SIGTERM);
   EXPECT_EQ(program.finish().code, 4);
   EXPECT_EQ(manager.all().back(), "STOPPING=1\nWATCHDOG=1");
+}
+
+// A service that ends well before it was ready has failed, to systemd.
+TEST_F(Service, IsReadyWhereNothingIsLeftToMeasure) {
+  write("rig.toml",
+        "[loop]\nrate_hz = 500\n[sweep]\nspacing = \"list\"\nfrequencies_hz = [50]\n"
+        "amplitude = 0.5\n[limits]\n[actuator]\n[sensor.y]\n"
+        "[plant]\nkind = \"transfer_function\"\nnum = [60]\nden = [1, 60]\n");
+  ASSERT_EQ(run({"run", "rig.toml", "--no-report"}).code, 0);
+  record::Database{path("rig.sweep"), record::Database::Mode::write}.execute(
+      "UPDATE part SET outcome = NULL, finished_utc = NULL; DELETE FROM run WHERE key = 'outcome'");
+  Manager manager{socket_};
+  setenv("NOTIFY_SOCKET", socket_.c_str(), 1);
+  const auto resumed = run({"run", "rig.toml", "--resume", "--no-report"});
+  unsetenv("NOTIFY_SOCKET");
+  EXPECT_EQ(resumed.code, 0) << resumed.err;
+  EXPECT_THAT(resumed.err, HasSubstr("1 of 1 dwells are finished, 0 to go"));
+  EXPECT_THAT(manager.all(), ElementsAre("READY=1", "STOPPING=1"));
 }
 
 class NightService : public Service {

@@ -1,20 +1,20 @@
 # shellcheck shell=bash
 # Sourced by virtual-bench: the kernel, built once for a given source package and configuration.
 
-# Prints the path of the kernel, building it first where the cache has none.
+# bench_kernel [systemd] : prints the path of the kernel, building it first where the cache has none.
 bench_kernel() {
-  local config=$root/tools/virtual-bench.d/kernel.config
+  local configs=("$root/tools/virtual-bench.d/kernel.config" ${1:+"$root/tools/virtual-bench.d/$1.config"})
   local cache=${XDG_CACHE_HOME:-$HOME/.cache}/sinerig/virtual-bench
   [ "$(uname -m)" = x86_64 ] || cannot "User-Mode-Linux is built for x86_64 only; this machine is $(uname -m)"
   mkdir -p "$cache" || cannot "$cache cannot be made; set XDG_CACHE_HOME to a folder that can"
 
   local key kernel
-  key=$({ sed 's/#.*//' "$config" | sort; declare -f adapt_source read_the_clock_in_4_ns fire_simulated_interrupts_at_once tell_of_simulated_levels; } | sha256sum | cut -c 1-12)
+  key=$({ cat "${configs[@]}" | sed 's/#.*//' | sort; declare -f adapt_source read_the_clock_in_4_ns fire_simulated_interrupts_at_once tell_of_simulated_levels; } | sha256sum | cut -c 1-12)
   kernel=$cache/linux-$key
   if [ ! -x "$kernel" ]; then
     exec 9>"$cache/lock"
     flock 9
-    [ -x "$kernel" ] || build_kernel "$config" "$cache" "$kernel"
+    [ -x "$kernel" ] || build_kernel "$cache" "$kernel" "${configs[@]}"
     exec 9>&-
   fi
   echo "$kernel"
@@ -90,7 +90,8 @@ insert_before() {
 }
 
 build_kernel() {
-  local config=$1 cache=$2 kernel=$3 archive work
+  local cache=$1 kernel=$2 archive work
+  shift 2
   (need linux-source flex bison bc make gcc libc6-dev xz-utils) >&2 ||
     cannot "the packages that the kernel is built from and with could not be installed"
   archive=$(find /usr/src -maxdepth 1 -name 'linux-source-*.tar.xz' | sort -V | tail -n 1)
@@ -102,7 +103,8 @@ build_kernel() {
     tar -xf "$archive" -C "$work" --strip-components=1 &&
       cd "$work" &&
       adapt_source &&
-      make ARCH=um SUBARCH=x86_64 KCONFIG_ALLCONFIG="$config" allnoconfig &&
+      cat "$@" >all.config &&
+      make ARCH=um SUBARCH=x86_64 KCONFIG_ALLCONFIG=all.config allnoconfig &&
       nice -n 10 make ARCH=um SUBARCH=x86_64 -j "$(nproc)" linux &&
       strip -o "$kernel.new" linux
   ) >"$cache/build.log" 2>&1; then
