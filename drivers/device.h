@@ -37,8 +37,8 @@ class Device {
   // settings in a power cut meanwhile. Throws like open().
   virtual void rearm() { arm(); }
 
-  // After all devices of the rig are armed, right before the loop: takes in what has arrived since
-  // somebody last looked, so that no read() returns it as new. Throws like open().
+  // After all devices of the rig are armed, and again right before the loop: takes in what has
+  // arrived since somebody last looked, so that no read() returns it as new. Throws like open().
   virtual void catch_up() {}
 
   // Outside the loop, after Actuator::release(): tries what that could not carry out.

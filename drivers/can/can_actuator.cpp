@@ -54,6 +54,7 @@ void CanActuator::arm() {
     throw;
   }
   health_.begin();
+  ages_begin_ = true;
   bus_.reserve(Bus::Room::set_points);
 }
 
@@ -70,6 +71,9 @@ Sample CanActuator::write(double command) noexcept {
     held_.time_ns = now_ns;
   }
   keep_alive(now_ns);
+  // Between arm() and the first tick the sweep file is made: that is no silence of the device.
+  if (ages_begin_) health_.begin_ages(now_ns);
+  ages_begin_ = false;
   violated_ = health_.violated(now_ns);
   Sample answer = held_;
   answer.fault = Fault::none;

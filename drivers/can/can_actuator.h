@@ -71,6 +71,7 @@ class CanActuator final : public Actuator {
   SendResult last_result_ = SendResult::sent;
   BusState last_state_ = BusState::up;  // then: a release may outlast what was wrong
   bool started_ = false;
+  bool ages_begin_ = false;  // at the next write()
   bool released_ = true;
 };
 

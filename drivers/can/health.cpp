@@ -1,5 +1,6 @@
 #include "drivers/can/health.h"
 
+#include <algorithm>
 #include <sstream>
 
 namespace sinerig::can {
@@ -36,7 +37,7 @@ const HealthRule* Health::violated(std::int64_t now_ns) const noexcept {
     const HealthRule& rule = rules_[n];
     const Slot& slot = bus_.slot(rule.slot);
     const bool seen = slot.count != counts_at_begin_[n];
-    const std::int64_t last_ns = seen ? slot.time_ns : begin_ns_;
+    const std::int64_t last_ns = seen ? std::max(slot.time_ns, begin_ns_) : begin_ns_;
     if (rule.max_age_ns > 0 && now_ns - last_ns > rule.max_age_ns) return &rule;
     if (seen && !holds(rule, decode(slot.frame.payload(), rule.signal))) return &rule;
   }

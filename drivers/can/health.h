@@ -31,6 +31,9 @@ class Health {
   // From now on frames are expected; what came before does not count.
   void begin() noexcept;
 
+  // Silence counts from `now_ns` on; what has been said since begin() stands.
+  void begin_ages(std::int64_t now_ns) noexcept SINERIG_NONBLOCKING { begin_ns_ = now_ns; }
+
   // The first rule that does not hold, or null. Looks at what the last Bus::poll() took in.
   const HealthRule* violated(std::int64_t now_ns) const noexcept SINERIG_NONBLOCKING;
 

@@ -81,6 +81,10 @@ void ConfiguredRig::open() {
 
 void ConfiguredRig::arm() {
   for (Part& part : parts_) part.device->arm();
+  catch_up();
+}
+
+void ConfiguredRig::catch_up() {
   for (Part& part : parts_) part.device->catch_up();
 }
 
@@ -91,7 +95,7 @@ void ConfiguredRig::keep_released() noexcept {
 std::string ConfiguredRig::arm_again() {
   try {
     for (Part& part : parts_) part.device->rearm();
-    for (Part& part : parts_) part.device->catch_up();
+    catch_up();
     return {};
   } catch (const std::exception& refused) {
     actuator_->release();

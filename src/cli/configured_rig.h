@@ -26,6 +26,7 @@ class ConfiguredRig final : public Rearm {
   // Acquires the hardware; the accessors below are valid from here on.
   void open();
   void arm();
+  void catch_up();  // with what has come since: right before the loop
   std::string fault_reason() const override;
   std::string arm_again() override;
   void keep_released() noexcept override;

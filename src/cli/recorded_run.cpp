@@ -284,6 +284,8 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
           "modes were lost with the interruption",
           writer->path());
     }
+    // The disk may have taken longer than a queue of the kernel lasts.
+    if (to_measure) configured.catch_up();
   } catch (...) {
     writer->discard();
     throw;

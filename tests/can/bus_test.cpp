@@ -724,6 +724,30 @@ TEST_F(CanBus, AHeartbeatThatStopsIsAFault) {
   EXPECT_THAT(actuator.reason(), HasSubstr("older than allowed"));
 }
 
+// The sweep file is made between arming and the first tick; nobody reads meanwhile, and a device
+// that answers set-points has none to answer.
+TEST_F(CanBus, TheTimeBetweenArmingAndTheFirstSetPointIsNoSilence) {
+  Peer peer;
+  Bus bus("vcan0", false);
+  CanActuator actuator(bus, command_with_health());
+  bus.start();
+  for (int round = 0; round < 2; ++round) {
+    actuator.arm();
+    peer.send(frame_of(0x01, {0, 0, 0, 0, 8, 0, 0, 0}));
+    usleep(900'000);
+    EXPECT_EQ(actuator.write(1.0).fault, Fault::none) << actuator.reason();
+    usleep(200'000);
+    EXPECT_EQ(actuator.write(1.0).fault, Fault::none) << actuator.reason();
+    usleep(200'000);
+    EXPECT_EQ(actuator.write(1.0).fault, Fault::device) << "it stays silent";
+    actuator.release();
+  }
+  actuator.arm();
+  peer.send(frame_of(0x01, {0, 0, 0, 0, 1, 0, 0, 0}));
+  usleep(900'000);
+  EXPECT_EQ(actuator.write(1.0).fault, Fault::device) << "what it said meanwhile counts";
+}
+
 TEST_F(CanBus, SilenceBecomesATimeOut) {
   Peer peer;
   Bus bus("vcan0", false);

@@ -40,5 +40,9 @@ echo "== lost"
 # float32 rounds to 6e-8, 5e-7 dB of a sample; cycles repeat the rounding, the samples of one average it.
 /usr/bin/python3 "$disturbed" "$out/first.csv" "$out/lost.csv" --lost 0.002 0.05 --rounding 1e-7 || status=1
 echo "== late"
-/usr/bin/python3 "$disturbed" "$out/first.csv" "$out/late.csv" --lost 0 0.5 --delay 0.0002 0.002 || status=1
+# Late by 0 to 2 ms, evenly, and read once a ms, the last to come: half of the replies come before the next
+# read, half before the one after it, so that a quarter of the reads finds none, and what is found is
+# 19/18 ms = 1.0556 ms old on average, with a scatter of 0.57 ms. That leaves 0.012 ms of the delay that fits, and
+# 1.9 % of the quarter for the fewest samples, 500; 3.5 of either are allowed.
+/usr/bin/python3 "$disturbed" "$out/first.csv" "$out/late.csv" --lost 0.18 0.32 --delay 0.001012 0.001099 || status=1
 exit $status

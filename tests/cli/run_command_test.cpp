@@ -20,12 +20,13 @@ namespace fs = std::filesystem;
 struct Witness {
   double last = 99.0;
   int releases = 0;
+  std::int64_t parts_when_caught_up = -1;  // in the sweep file, when the device was told last
 };
 
 // Moves its output on opening, and lets go of it at its end.
 class FakeDevice final : public Device {
  public:
-  explicit FakeDevice(Witness& witness) : witness_{witness} {}
+  FakeDevice(Witness& witness, fs::path file) : witness_{witness}, file_{std::move(file)} {}
   ~FakeDevice() override {
     if (actuator_) actuator_->release();
     note();
@@ -35,6 +36,12 @@ class FakeDevice final : public Device {
     actuator_->write(0.3);
     sensor_.emplace(clock, [this](std::uint64_t) { return actuator_->last; });
     note();
+  }
+  void catch_up() override {
+    record::Database database{file_, record::Database::Mode::read};
+    record::Statement parts{database, "SELECT count(*) FROM part"};
+    parts.step();
+    witness_.parts_when_caught_up = parts.integer(0);
   }
   Actuator* actuator() noexcept override { return &*actuator_; }
   Sensor& sensor(std::size_t) noexcept override { return *sensor_; }
@@ -46,6 +53,7 @@ class FakeDevice final : public Device {
     witness_.releases = actuator_->releases;
   }
   Witness& witness_;
+  fs::path file_;
   std::optional<test::FakeActuator> actuator_;
   std::optional<test::FakeSensor> sensor_;
 };
@@ -65,10 +73,12 @@ class RunCommand : public testing::Test {
   }
   ~RunCommand() override { fs::remove_all(folder_); }
 
-  std::string rig(const std::string& second_sensor) const {
+  std::string rig(const std::string& second_sensor, int points = 300) const {
     const std::string path = folder_ / "rig.toml";
     std::ofstream{path} << "[loop]\nrate_hz = 2000\n[sweep]\nstart_hz = 20\nstop_hz = 200\n"
-                           "points = 300\namplitude = 0.2\nfrequency_tolerance = 1e-6\n"
+                           "amplitude = 0.2\nfrequency_tolerance = 1e-6\npoints = "
+                        << points
+                        << "\n"
                            "[limits]\n[actuator]\n[sensor.y]\n"
                         << second_sensor << "[output]\nsamples = true\n";
     return path;
@@ -77,8 +87,8 @@ class RunCommand : public testing::Test {
     return {.rig = rig_path, .output = folder_ / "run.sweep"};
   }
   DriverKit fake(Witness& witness) const {
-    return {.name = "sim", .summary = "", .configure = [&witness](const DeviceRequest&) {
-              return std::make_unique<FakeDevice>(witness);
+    return {.name = "sim", .summary = "", .configure = [&witness, this](const DeviceRequest&) {
+              return std::make_unique<FakeDevice>(witness, folder_ / "run.sweep");
             }};
   }
 
@@ -96,6 +106,13 @@ TEST_F(RunCommand, ReleasesTheActuatorWhenAnotherDriverCannotBeOpened) {
   EXPECT_EQ(witness.last, 0.0);
   EXPECT_GE(witness.releases, 1);
   EXPECT_FALSE(fs::exists(folder_ / "run.sweep"));
+}
+
+// That commit may take a disk a while.
+TEST_F(RunCommand, TellsTheDevicesToCatchUpOnceItsPartIsInTheFile) {
+  Witness witness;
+  EXPECT_EQ(run_command(options(rig("", 2)), {fake(witness)}), exit_done);
+  EXPECT_EQ(witness.parts_when_caught_up, 1);
 }
 
 TEST_F(RunCommand, ReleasesTheActuatorWhenTheDiskIsFull) {
