@@ -64,7 +64,10 @@ int compare_command(const CompareOptions& options) {
     for (const report::Drift& drift : drifts)
       report::print_drift(std::cout, runs.front().label, drift);
   } else if (options.voice == Voice::json) {
-    std::cout << report::comparison_json(runs.front().label, differences, drifts).dump(1) << '\n';
+    const nlohmann::ordered_json json =
+        report::comparison_json(runs.front().label, differences, drifts);
+    // A label is a file's name, of whatever bytes.
+    std::cout << json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
   }
   if (!options.output.empty()) {
     write_file(

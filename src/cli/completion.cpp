@@ -73,6 +73,15 @@ std::string files_of(const CLI::Option* positional) {
   return name == "RIG" || name == "JOB" ? "toml" : "sweep|csv|txt|mat|uff|unv";
 }
 
+// Those that may stand before and behind the command.
+std::vector<CompletedOption> global_options(const CLI::App& app) {
+  std::vector<CompletedOption> options = options_of(app);
+  std::erase_if(options, [](const CompletedOption& option) {
+    return option.names.back() == "--help" || option.names.back() == "--version";
+  });
+  return options;
+}
+
 std::vector<CompletedCommand> commands_of(const CLI::App& app) {
   std::vector<CompletedCommand> commands;
   for (const CLI::App* each : app.get_subcommands([](const CLI::App*) { return true; })) {
@@ -83,10 +92,8 @@ std::vector<CompletedCommand> commands_of(const CLI::App& app) {
         .files = files_of(positional),
         .words = positional == nullptr ? std::vector<std::string>{} : values_of(*positional),
         .options = options_of(*each)};
-    for (CompletedOption& option : options_of(app)) {
-      const std::string& name = option.names.back();
-      if (name != "--help" && name != "--version") command.options.push_back(std::move(option));
-    }
+    for (CompletedOption& option : global_options(app))
+      command.options.push_back(std::move(option));
     commands.push_back(std::move(command));
   }
   return commands;
@@ -114,7 +121,32 @@ std::string quoted(const std::string& text, bool zsh = false) {
   return result;
 }
 
-void write_bash(std::ostream& stream, const std::vector<CompletedCommand>& commands) {
+// What completes the values of options, for `case $before`.
+void write_bash_values(std::ostream& stream, const std::vector<CompletedOption>& options) {
+  for (const CompletedOption& option : options) {
+    if (!option.takes_value) continue;
+    stream << "        " << joined(option.names, "|") << ") ";
+    if (option.values.empty()) {
+      stream << "COMPREPLY=($(compgen -f -- \"$word\")); return ;;\n";
+    } else {
+      stream << "COMPREPLY=($(compgen -W '" << joined(option.values, " ")
+             << "' -- \"$word\")); return ;;\n";
+    }
+  }
+}
+
+std::vector<std::string> names_of(const std::vector<CompletedOption>& options,
+                                  bool with_value_only) {
+  std::vector<std::string> names;
+  for (const CompletedOption& option : options) {
+    if (option.takes_value || !with_value_only)
+      names.insert(names.end(), option.names.begin(), option.names.end());
+  }
+  return names;
+}
+
+void write_bash(std::ostream& stream, const std::vector<CompletedCommand>& commands,
+                const std::vector<CompletedOption>& globals) {
   std::vector<std::string> names;
   names.reserve(commands.size());
   for (const CompletedCommand& command : commands) names.push_back(command.name);
@@ -124,27 +156,25 @@ void write_bash(std::ostream& stream, const std::vector<CompletedCommand>& comma
             "  local options= files= words=\n"
             "  COMPREPLY=()\n"
             "  for ((i = 1; i < COMP_CWORD; ++i)); do\n"
-            "    case ${COMP_WORDS[i]} in -*) ;; *) command=${COMP_WORDS[i]}; break ;; esac\n"
+            "    case ${COMP_WORDS[i]} in\n";
+  // Bash makes --level=debug three words. The value is not the command.
+  if (const std::vector<std::string> valued = names_of(globals, true); !valued.empty())
+    stream << "      " << joined(valued, "|")
+           << ") [[ ${COMP_WORDS[i+1]} != = ]] || ((++i)); ((++i)) ;;\n";
+  stream << "      -*) ;;\n"
+            "      *) command=${COMP_WORDS[i]}; break ;;\n"
+            "    esac\n"
             "  done\n"
             "  case $command in\n"
-            "    '') options='"
-         << joined(names, " ") << " --help --version' ;;\n";
+            "    '')\n      case $before in\n";
+  write_bash_values(stream, globals);
+  stream << "      esac\n      options='" << joined(names, " ") << ' '
+         << joined(names_of(globals, false), " ") << " --help --version' ;;\n";
   for (const CompletedCommand& command : commands) {
     stream << "    " << command.name << ")\n      case $before in\n";
-    std::vector<std::string> options;
-    for (const CompletedOption& option : command.options) {
-      options.insert(options.end(), option.names.begin(), option.names.end());
-      if (!option.takes_value) continue;
-      stream << "        " << joined(option.names, "|") << ") ";
-      if (option.values.empty()) {
-        stream << "COMPREPLY=($(compgen -f -- \"$word\")); return ;;\n";
-      } else {
-        stream << "COMPREPLY=($(compgen -W '" << joined(option.values, " ")
-               << "' -- \"$word\")); return ;;\n";
-      }
-    }
-    stream << "      esac\n      options='" << joined(options, " ") << "' files='" << command.files
-           << "' words='" << joined(command.words, " ") << "' ;;\n";
+    write_bash_values(stream, command.options);
+    stream << "      esac\n      options='" << joined(names_of(command.options, false), " ")
+           << "' files='" << command.files << "' words='" << joined(command.words, " ") << "' ;;\n";
   }
   stream << "  esac\n"
             "  if [[ $word == -* || -z $command ]]; then\n"
@@ -233,7 +263,7 @@ void write_fish(std::ostream& stream, const std::vector<CompletedCommand>& comma
 
 void write_completion(std::ostream& stream, const CLI::App& app, const std::string& shell) {
   const std::vector<CompletedCommand> commands = commands_of(app);
-  if (shell == "bash") return write_bash(stream, commands);
+  if (shell == "bash") return write_bash(stream, commands, global_options(app));
   if (shell == "zsh") return write_zsh(stream, commands);
   if (shell == "fish") return write_fish(stream, commands);
   throw std::invalid_argument{"no completion for \"" + shell + "\"; there is bash, zsh and fish"};

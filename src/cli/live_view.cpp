@@ -38,6 +38,7 @@ dashboard::LiveSetup setup_of(const config::Rig& rig, const SweepPlan& plan,
                              static_cast<std::uint32_t>(applied_channel + pair.output),
                              {}});
   }
+  for (record::StoredResponse& response : run.responses) response.hold_rate_hz = plan.rate_hz;
   return setup;
 }
 

@@ -82,7 +82,7 @@ int margins_command(const MarginsOptions& options) {
     }
   }
   if (options.json)
-    std::cout << json.dump(2) << '\n';
+    std::cout << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << '\n';
   else
     report::print_loop(std::cout, "points (their scatter only, not what lies between neighbours)",
                        of_points, std::nullopt);

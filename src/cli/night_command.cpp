@@ -185,8 +185,9 @@ int Night::conclude(const NightFolder& folder, int code) {
   report::print_night(words, options_.job, rows);
   write_file(folder.path("summary.txt"), true,
              [&](std::ostream& stream) { stream << words.str(); });
-  write_file(folder.path("summary.json"), true,
-             [&](std::ostream& stream) { stream << json.dump(1) << '\n'; });
+  write_file(folder.path("summary.json"), true, [&](std::ostream& stream) {
+    stream << json.dump(1, ' ', false, ordered_json::error_handler_t::replace) << '\n';
+  });
   if (options_.voice == Voice::json) {
     ordered_json line{{"type", "night"}};
     line.update(json);

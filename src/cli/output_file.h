@@ -7,7 +7,8 @@
 
 namespace sinerig::cli {
 
-// Opens `path`, lets `write` fill it, closes it. Throws record::FileExists when it exists and is
+// Lets `write` make the text, then writes it beside `path` and puts it there: whatever fails leaves
+// the file that was there as it was. Throws record::FileExists when it exists and is
 // not to be replaced, record::SweepFileError when it cannot be written in full.
 void write_file(const std::string& path, bool force,
                 const std::function<void(std::ostream&)>& write);

@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <iostream>
+#include <langinfo.h>
+#include <locale.h>
 #include <unistd.h>
 
 #include <nlohmann/json.hpp>
@@ -21,16 +23,36 @@ namespace {
 using Json = nlohmann::ordered_json;
 using report::Progress;
 
-std::size_t terminal_columns() {
+// As the environment wants it for the terminal's characters; sinerig itself speaks the C locale.
+bool speaks_utf8() {
+  const locale_t locale = newlocale(LC_CTYPE_MASK, "", locale_t{});
+  if (locale == locale_t{}) return false;
+  const bool utf8 = std::strcmp(nl_langinfo_l(CODESET, locale), "UTF-8") == 0;
+  freelocale(locale);
+  return utf8;
+}
+
+// https://no-color.org
+bool colour_wanted() {
+  const char* refused = std::getenv("NO_COLOR");
+  return refused == nullptr || *refused == '\0';
+}
+
+Progress::Screen screen() {
+  Progress::Screen found{.colour = colour_wanted()};
   winsize size{};
-  return ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : 80;
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0) return found;
+  if (size.ws_col > 0) found.columns = size.ws_col;
+  if (size.ws_row > 0) found.rows = size.ws_row;
+  return found;
 }
 
 Progress::Style style_of(Voice voice) {
   if (voice != Voice::text) return Progress::Style::none;
   const char* term = std::getenv("TERM");
   const bool dumb = term == nullptr || std::strcmp(term, "dumb") == 0;
-  return isatty(STDOUT_FILENO) != 0 && !dumb ? Progress::Style::live : Progress::Style::lines;
+  const bool drawable = isatty(STDOUT_FILENO) != 0 && !dumb && speaks_utf8();
+  return drawable ? Progress::Style::live : Progress::Style::lines;
 }
 
 void print_line(const Json& json) {
@@ -44,7 +66,7 @@ RunTeller::RunTeller(Voice voice, bool table, const config::Rig& rig, const Swee
       table_{table},
       rig_{rig},
       plan_{plan},
-      progress_{std::cout, style_of(voice), plan, terminal_columns()} {}
+      progress_{std::cout, style_of(voice), plan, screen} {}
 
 void RunTeller::plan(const std::string& live_page) {
   if (voice_ == Voice::json) {

@@ -66,4 +66,11 @@ Address parse_address(const std::string& text) {
   return address;
 }
 
+bool is_this_machine(const std::string& host) {
+  if (host == "localhost" || host == "[::1]") return true;
+  in_addr address{};
+  return inet_pton(AF_INET, host.c_str(), &address) == 1 &&
+         (ntohl(address.s_addr) >> 24U) == IN_LOOPBACKNET;
+}
+
 }  // namespace sinerig::dashboard

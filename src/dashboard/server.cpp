@@ -187,7 +187,7 @@ class Server::Loop {
   // A page of another site that has its name resolve to this machine must not get to read this one.
   bool host_is_ours(const std::string& host) const {
     if (!settings_.address.loopback()) return true;
-    return host == "localhost" || host == "[::1]" || host.rfind("127.", 0) == 0;
+    return is_this_machine(host);
   }
 
   void stop(Connection& client, const HttpRequest& request) {

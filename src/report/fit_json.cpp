@@ -243,7 +243,7 @@ std::string fit_json(const FitReport& report) {
   json["response"] = band_json(report);
   if (report.choe) json["choe"] = choe_json(*report.choe);
   json["candidates"] = candidates_json(report);
-  return json.dump(2);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace sinerig::report

@@ -139,7 +139,7 @@ std::string notch_json(const NotchReport& report) {
   for (const DesignedNotch& each : report.notches) json["notches"].push_back(notch_object(each));
   if (report.before) json["before"] = loop_json(report.before->figures, report.before->stable);
   if (report.after) json["after"] = loop_json(report.after->figures, report.after->stable);
-  return json.dump(2);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace sinerig::report

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 #include <ostream>
+#include <utility>
 
 #include "record/text.h"
 #include "report/sparkline.h"
@@ -17,6 +18,8 @@ using record::text;
 
 constexpr std::chrono::milliseconds draw_interval{100};
 constexpr std::size_t least_columns = 80;
+constexpr std::size_t most_columns = 110;
+constexpr std::size_t least_rows = 14;  // a picture and the line below it where the cursor stands
 constexpr std::size_t plot_rows = 6;
 constexpr std::size_t label_width = 9;  // of the plot's axis
 constexpr std::size_t points_shown = 5;
@@ -55,12 +58,25 @@ std::string line_of(const Point& point, std::size_t number, std::size_t points) 
 
 }  // namespace
 
-Progress::Progress(std::ostream& stream, Style style, const SweepPlan& plan, std::size_t columns)
-    : stream_{stream},
-      style_{style == Style::live && columns < least_columns ? Style::lines : style},
-      plan_{plan},
-      columns_{std::min<std::size_t>(columns, 110)},
-      time_{plan} {}
+Progress::Progress(std::ostream& stream, Style style, const SweepPlan& plan,
+                   std::function<Screen()> screen)
+    : stream_{stream}, style_{style}, plan_{plan}, ask_screen_{std::move(screen)}, time_{plan} {
+  look_at_screen();
+}
+
+void Progress::look_at_screen() {
+  if (style_ != Style::live) return;
+  screen_ = ask_screen_();
+  const bool room = screen_.columns >= least_columns && screen_.rows >= least_rows;
+  screen_.columns = std::min(screen_.columns, most_columns);
+  if (room) return;
+  close();
+  style_ = Style::lines;
+}
+
+const char* Progress::paint(const char* code) const {
+  return screen_.colour ? code : "";
+}
 
 void Progress::resume(const std::vector<Point>& points) {
   for (const Point& point : points) {
@@ -75,6 +91,7 @@ void Progress::point(const Point& point) {
   if (point.pair != 0) return;
   ++seen_;
   if (point.status != PointStatus::good) ++not_good_;
+  look_at_screen();
   if (style_ == Style::live) points_.push_back(point);
   if (style_ == Style::lines)
     stream_ << line_of(point, seen_, point_count(plan_)) << status_text(point) << std::endl;
@@ -87,18 +104,19 @@ void Progress::update(std::uint32_t dwell, std::uint64_t tick) {
   const auto now = std::chrono::steady_clock::now();
   if (now < next_) return;
   next_ = now + draw_interval;
-  draw();
+  look_at_screen();
+  if (style_ == Style::live) draw();
 }
 
 std::string Progress::bar(std::size_t width) const {
   static constexpr const char* eighths[] = {"", "▏", "▎", "▍", "▌", "▋", "▊", "▉"};
   const auto filled = static_cast<std::size_t>(time_.done() * static_cast<double>(8 * width));
-  std::string drawn = blue;
+  std::string drawn = paint(blue);
   for (std::size_t i = 0; i < filled / 8; ++i) drawn += "█";
   drawn += eighths[filled % 8];
-  drawn += std::string{plain} + soft;
+  drawn += std::string{paint(plain)} + paint(soft);
   for (std::size_t i = (filled + 7) / 8; i < width; ++i) drawn += "░";
-  return drawn + plain;
+  return drawn + paint(plain);
 }
 
 // The gain over the whole range of the plan, filling up as points come in.
@@ -132,14 +150,14 @@ std::vector<std::string> Progress::plot(std::size_t width) const {
     const std::string label = i == 0                 ? text("%5.0f dB ", high)
                               : i + 1 == rows.size() ? text("%5.0f dB ", low)
                                                      : std::string(label_width - 1, ' ') + " ";
-    rows[i] = soft + label + "│" + plain + blue + rows[i] + plain;
+    rows[i] = paint(soft) + label + "│" + paint(plain) + paint(blue) + rows[i] + paint(plain);
   }
   const std::string from = text("%.4g", first_hz);
   const std::string to = text("%.4g Hz", last_hz);
   const std::size_t gap =
       width - label_width - std::min(width - label_width, from.size() + to.size());
-  rows.push_back(std::string{soft} + std::string(label_width, ' ') + " " + from +
-                 std::string(gap, ' ') + to + plain);
+  rows.push_back(std::string{paint(soft)} + std::string(label_width, ' ') + " " + from +
+                 std::string(gap, ' ') + to + paint(plain));
   return rows;
 }
 
@@ -149,16 +167,19 @@ std::vector<std::string> Progress::picture() const {
   const std::size_t number = std::min<std::size_t>(dwell_ + 1, planned);
   std::vector<std::string> lines;
   const std::string place =
-      refining ? text("%zu+%zu  ", planned, dwell_ + 1 - planned) + bold + "refining" + plain
-               : text("%zu/%zu  ", number, planned) + bold +
-                     text("%.4g Hz", plan_.dwells[number - 1].frequency_hz(plan_.rate_hz)) + plain;
+      refining ? text("%zu+%zu  ", planned, dwell_ + 1 - planned) + paint(bold) + "refining" +
+                     paint(plain)
+               : text("%zu/%zu  ", number, planned) + paint(bold) +
+                     text("%.4g Hz", plan_.dwells[number - 1].frequency_hz(plan_.rate_hz)) +
+                     paint(plain);
   const std::string left =
-      refining ? "" : ", " + (bold + duration_text(time_.remaining_s())) + plain + " left";
+      refining ? ""
+               : ", " + (paint(bold) + duration_text(time_.remaining_s())) + paint(plain) + " left";
   const std::string times =
       place + "  " + duration_text(time_.elapsed_s()) + " elapsed" + left +
-      (not_good_ == 0 ? "" : yellow + text(", %zu not good", not_good_) + plain);
-  lines.push_back(bar(columns_ - 66) + " " + times);
-  for (std::string& row : plot(columns_ - 2)) lines.push_back(std::move(row));
+      (not_good_ == 0 ? "" : paint(yellow) + text(", %zu not good", not_good_) + paint(plain));
+  lines.push_back(bar(screen_.columns - 66) + " " + times);
+  for (std::string& row : plot(screen_.columns - 2)) lines.push_back(std::move(row));
   const std::size_t first = points_.size() - std::min(points_.size(), points_shown);
   for (std::size_t i = first; i < first + points_shown; ++i) {
     if (i >= points_.size()) {
@@ -166,8 +187,8 @@ std::vector<std::string> Progress::picture() const {
       continue;
     }
     const bool good = points_[i].status == PointStatus::good;
-    lines.push_back(line_of(points_[i], i + 1, point_count(plan_)) + (good ? green : yellow) +
-                    status_text(points_[i]) + plain);
+    lines.push_back(line_of(points_[i], i + 1, point_count(plan_)) +
+                    (good ? paint(green) : paint(yellow)) + status_text(points_[i]) + paint(plain));
   }
   return lines;
 }

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <iosfwd>
 #include <string>
 #include <vector>
@@ -21,8 +22,16 @@ class Progress {
     none,
   };
 
-  // `columns` is the width of the terminal; below 80 a live picture becomes lines.
-  Progress(std::ostream& stream, Style style, const SweepPlan& plan, std::size_t columns);
+  struct Screen {
+    std::size_t columns = 80;
+    std::size_t rows = 24;
+    bool colour = true;
+  };
+
+  // `screen` is asked before every picture and point, since windows change their size. Where one
+  // has no room on it, 80 columns and 14 rows, there are lines from then on.
+  Progress(std::ostream& stream, Style style, const SweepPlan& plan,
+           std::function<Screen()> screen);
 
   // Points of before an interruption: counted and drawn, not listed again.
   void resume(const std::vector<Point>& points);
@@ -37,7 +46,9 @@ class Progress {
   void close();
 
  private:
+  void look_at_screen();
   void draw();
+  const char* paint(const char* code) const;
   std::string bar(std::size_t width) const;
   std::vector<std::string> picture() const;
   std::vector<std::string> plot(std::size_t width) const;
@@ -45,7 +56,8 @@ class Progress {
   std::ostream& stream_;
   Style style_;
   SweepPlan plan_;
-  std::size_t columns_;
+  std::function<Screen()> ask_screen_;
+  Screen screen_;
   RemainingTime time_;
   std::uint32_t dwell_ = 0;
   std::vector<Point> points_;

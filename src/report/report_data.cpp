@@ -169,8 +169,13 @@ std::string difference_counts(const record::Difference& difference) {
   return words;
 }
 
-const std::vector<std::string>& notes() {
-  static const std::vector<std::string> text{
+bool held(const StoredRun& run) {
+  return std::any_of(run.responses.begin(), run.responses.end(),
+                     [](const StoredResponse& each) { return each.hold_rate_hz > 0.0; });
+}
+
+std::vector<std::string> notes(bool any_held) {
+  std::vector<std::string> words{
       "H is the ratio of two measured Fourier coefficients, output over input: with the input "
       "A₀ sin ωt and the steady output a₀ + a₁ cos ωt + b₁ sin ωt the gain is √(a₁² + b₁²)/A₀ and "
       "the phase atan2(a₁, b₁); a lag is negative.",
@@ -179,9 +184,14 @@ const std::vector<std::string>& notes() {
       "goes "
       "with the input, over records of one cycle; distortion is that of the harmonics, relative to "
       "the "
-      "tone. Points are drawn whatever their status; only good ones are filled.",
-      "The rig saw a zero-order hold at the rate of the loop; the measured response includes it."};
-  return text;
+      "tone. Points are drawn whatever their status; only good ones are filled."};
+  // Nobody knows what has driven a rig that others have measured.
+  if (any_held) {
+    words.emplace_back(
+        "The rig saw a zero-order hold at the rate of the loop; the measured response includes "
+        "it.");
+  }
+  return words;
 }
 
 }  // namespace
@@ -247,7 +257,7 @@ Json page_of_run(const LabelledRun& labelled) {
           {"runs", Json::array({run_json(labelled)})},
           {"responses", responses},
           {"differences", Json::array()},
-          {"notes", notes()}};
+          {"notes", notes(held(run))}};
 }
 
 Json page_of_comparison(const std::vector<LabelledRun>& runs,
@@ -274,7 +284,11 @@ Json page_of_comparison(const std::vector<LabelledRun>& runs,
     summary.push_back({each.name, verdict_word(each), difference_counts(each)});
   }
   std::vector<std::string> labels;
-  for (const LabelledRun& run : runs) labels.push_back(run.label);
+  bool any_held = false;
+  for (const LabelledRun& each : runs) {
+    labels.push_back(each.label);
+    any_held = any_held || held(each.run);
+  }
   // As the program's exit code has it: a change comes first, then what could not be compared.
   std::string outcome = "done";
   std::string outcome_text = scatter_known ? "same within the scatter" : "same within tolerances";
@@ -295,7 +309,7 @@ Json page_of_comparison(const std::vector<LabelledRun>& runs,
           {"runs", run_list},
           {"responses", responses},
           {"differences", differences_list},
-          {"notes", notes()}};
+          {"notes", notes(any_held)}};
 }
 
 }  // namespace sinerig::report

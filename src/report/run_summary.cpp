@@ -21,10 +21,13 @@ using record::StoredPoint;
 using record::StoredRun;
 using record::text;
 
+// What may stand in a headline; the table shows the others, each with its status.
+bool trusted(const StoredPoint& point) {
+  return point.status == "good" || point.status == "imported";
+}
+
 Json points_fact(const std::vector<StoredPoint>& points, std::size_t planned) {
-  const auto good = std::count_if(points.begin(), points.end(), [](const StoredPoint& point) {
-    return point.status == "good" || point.status == "imported";
-  });
+  const auto good = std::count_if(points.begin(), points.end(), trusted);
   const auto others = static_cast<std::ptrdiff_t>(points.size()) - good;
   const std::string missing =
       points.size() < planned ? text("of %zu planned, ", planned) : std::string{};
@@ -53,7 +56,7 @@ Json peak_fact(const StoredRun& run) {
   const record::StoredResponse& response = run.responses.front();
   const StoredPoint* peak = nullptr;
   for (const StoredPoint& point : response.points) {
-    if (!std::isfinite(std::abs(point.response))) continue;
+    if (!trusted(point) || !std::isfinite(std::abs(point.response))) continue;
     if (peak == nullptr || std::abs(point.response) > std::abs(peak->response)) peak = &point;
   }
   if (peak == nullptr) return nullptr;
@@ -67,7 +70,7 @@ Json interval_fact(const std::vector<StoredPoint>& points) {
   std::vector<double> phases;
   for (const StoredPoint& point : points) {
     const record::HalfWidth95 half = half_width95(point);
-    if (std::isnan(half.gain)) continue;
+    if (!trusted(point) || std::isnan(half.gain)) continue;
     gains.push_back(half.gain * record::db_per_relative);
     phases.push_back(half.phase_rad * record::degrees_per_radian);
   }

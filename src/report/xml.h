@@ -6,18 +6,8 @@
 
 namespace sinerig::report {
 
-inline std::string xml_text(std::string_view text) {
-  std::string safe;
-  for (const char each : text) {
-    switch (each) {
-      case '&': safe += "&amp;"; break;
-      case '<': safe += "&lt;"; break;
-      case '>': safe += "&gt;"; break;
-      case '"': safe += "&quot;"; break;
-      default: safe += each;
-    }
-  }
-  return safe;
-}
+// Escaped; what no XML may hold (bytes that are no UTF-8, control characters: names of files have
+// them) becomes U+FFFD.
+std::string xml_text(std::string_view text);
 
 }  // namespace sinerig::report

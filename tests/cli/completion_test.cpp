@@ -72,6 +72,12 @@ TEST_F(Completion, BashCompletesAtItsPrompt) {
   bash.run("bind '\"\\C-t\": insert-completions'");
   expect_lines(bash, completed_everywhere);
   EXPECT_EQ(bash.arguments_after("sinerig run geo\t"), "|run|geometry/");
+  // The value of an option that stands before the command is not the command.
+  EXPECT_EQ(bash.arguments_after("sinerig --log-level debug run --se\t"),
+            "|--log-level|debug|run|--serve");
+  EXPECT_EQ(bash.arguments_after("sinerig --log-level=debug run gim\t"),
+            "|--log-level=debug|run|gimbal.toml");
+  EXPECT_EQ(bash.arguments_after("sinerig --log-level deb\t"), "|--log-level|debug");
   EXPECT_EQ(bash.arguments_after("sinerig doctor --\x14"),
             "|doctor|--help|--json|--log-level|--seconds|--strict");
 }

@@ -89,5 +89,22 @@ TEST_F(ReportCommand, DrawsAPicture) {
   EXPECT_THAT(unknown.errors, HasSubstr("has no response of \"nose\"; it has position"));
 }
 
+// Names of files are bytes: neither UTF-8 nor printable, if their owner likes.
+TEST_F(ReportCommand, TakesFilesOfAnyName) {
+  const std::string latin = "caf\xe9.csv";
+  const std::string control = "x\x01.csv";
+  for (const std::string& name : {latin, control})
+    workshop_.write(name, "1,1,0\n2,0.9,-0.1\n4,0.7,-0.3\n8,0.4,-0.4\n");
+  const auto compared = workshop_.sinerig("compare " + latin + " " + control + " --json");
+  EXPECT_EQ(compared.exit_code, 0) << compared.errors;
+  EXPECT_THAT(compared.output, HasSubstr("\"reference\": \"caf\uFFFD\""));
+  for (const std::string& name : {latin, control}) {
+    EXPECT_EQ(workshop_.sinerig("report " + name).exit_code, 0);
+    EXPECT_EQ(workshop_.sinerig("report " + name + " --format svg").exit_code, 0);
+    const auto png = workshop_.sinerig("report " + name + " --format png");
+    EXPECT_THAT(png.errors, testing::Not(HasSubstr("XML")));
+  }
+}
+
 }  // namespace
 }  // namespace sinerig

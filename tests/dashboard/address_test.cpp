@@ -36,5 +36,13 @@ TEST(Address, RefusesWithWhatWasMeant) {
   }
 }
 
+TEST(Address, KnowsTheNamesOfThisMachine) {
+  for (const char* ours : {"localhost", "127.0.0.1", "127.1.2.3", "[::1]"})
+    EXPECT_TRUE(is_this_machine(ours)) << ours;
+  for (const char* other : {"127.evil.example", "127.0.0.1.evil.example", "localhost.evil.example",
+                            "128.0.0.1", "127.", "127.1", "::2", ""})
+    EXPECT_FALSE(is_this_machine(other)) << other;
+}
+
 }  // namespace
 }  // namespace sinerig::dashboard

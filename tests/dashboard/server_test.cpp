@@ -58,6 +58,9 @@ TEST_F(ServerTest, IsReadByNoOtherSite) {
   HttpClient rebound{port()};
   rebound.send("GET /run.json HTTP/1.1\r\nHost: evil.example\r\n\r\n");
   EXPECT_EQ(rebound.status(), "403");
+  HttpClient numbered{port()};
+  numbered.send("GET /run.json HTTP/1.1\r\nHost: 127.evil.example\r\n\r\n");
+  EXPECT_EQ(numbered.status(), "403");
   HttpClient nameless{port()};
   nameless.send("GET /run.json HTTP/1.0\r\n\r\n");
   EXPECT_EQ(nameless.status(), "403");

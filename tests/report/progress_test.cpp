@@ -1,6 +1,8 @@
 #include "report/progress.h"
 
+#include <algorithm>
 #include <sstream>
+#include <utility>
 
 #include <gmock/gmock.h>
 
@@ -30,9 +32,13 @@ Point point_of(std::uint32_t dwell, PointStatus status = PointStatus::good) {
   return point;
 }
 
+Progress::Screen wide() {
+  return {.columns = 100, .rows = 40, .colour = true};
+}
+
 TEST(Progress, IsALinePerPointInAPipe) {
   std::ostringstream stream;
-  Progress progress{stream, Progress::Style::lines, plan_of(20), 200};
+  Progress progress{stream, Progress::Style::lines, plan_of(20), wide};
   Point third = point_of(2);
   third.pair = 1;
   progress.point(point_of(1));
@@ -45,7 +51,7 @@ TEST(Progress, IsALinePerPointInAPipe) {
 
 TEST(Progress, DrawsAPictureAndTakesItAway) {
   std::ostringstream stream;
-  Progress progress{stream, Progress::Style::live, plan_of(20), 100};
+  Progress progress{stream, Progress::Style::live, plan_of(20), wide};
   for (std::uint32_t i = 0; i < 8; ++i) progress.point(point_of(i));
   progress.point(point_of(8, PointStatus::unsettled));
   progress.update(9, 12345);
@@ -64,7 +70,7 @@ TEST(Progress, NamesWhatRefinementAddsAndWhatAModelEnded) {
   std::ostringstream stream;
   SweepPlan plan = plan_of(2);
   plan.refinement.most_points = 4;
-  Progress lines{stream, Progress::Style::lines, plan, 200};
+  Progress lines{stream, Progress::Style::lines, plan, wide};
   for (std::uint32_t i = 0; i < 3; ++i) {
     Point point = point_of(i);
     if (i == 2) point.settled_by = SettledBy::model;
@@ -74,15 +80,57 @@ TEST(Progress, NamesWhatRefinementAddsAndWhatAModelEnded) {
   EXPECT_THAT(stream.str(), HasSubstr("   2+1     3.0000 Hz"));
   EXPECT_THAT(stream.str(), testing::EndsWith("good, transient modelled\n"));
   std::ostringstream drawn;
-  Progress live{drawn, Progress::Style::live, plan, 100};
+  Progress live{drawn, Progress::Style::live, plan, wide};
   live.update(3, 2000);
   EXPECT_THAT(drawn.str(), HasSubstr("2+2  \033[1mrefining"));
   EXPECT_THAT(drawn.str(), testing::Not(HasSubstr(" left")));
 }
 
+TEST(Progress, IsALinePerPointWhereAPictureHasNoRoom) {
+  const std::pair<std::size_t, std::size_t> sizes[] = {{79, 40}, {100, 13}};
+  for (const auto& [columns, rows] : sizes) {
+    std::ostringstream stream;
+    Progress progress{stream, Progress::Style::live, plan_of(20), [columns = columns, rows = rows] {
+                        return Progress::Screen{.columns = columns, .rows = rows};
+                      }};
+    progress.point(point_of(1));
+    progress.update(3, 4000);
+    EXPECT_THAT(stream.str(), testing::EndsWith("good\n")) << columns << " x " << rows;
+    EXPECT_THAT(stream.str(), testing::Not(HasSubstr("\033"))) << columns << " x " << rows;
+  }
+}
+
+// A picture takes all of its lines and one for the cursor: 14.
+TEST(Progress, GoesOnInLinesWhereTheWindowGetsTooSmall) {
+  std::ostringstream stream;
+  std::size_t rows = 14;
+  Progress progress{stream, Progress::Style::live, plan_of(20), [&rows] {
+                      return Progress::Screen{.columns = 100, .rows = rows};
+                    }};
+  progress.update(1, 1000);
+  EXPECT_EQ(std::ranges::count(stream.str(), '\n'), 13);
+  rows = 13;
+  stream.str("");
+  progress.point(point_of(1));
+  EXPECT_THAT(stream.str(), testing::StartsWith("\033[13A\r\033[J   1/20 "));
+  EXPECT_THAT(stream.str(), testing::EndsWith("good\n"));
+}
+
+TEST(Progress, IsPlainWhereColourIsRefused) {
+  std::ostringstream stream;
+  Progress progress{stream, Progress::Style::live, plan_of(20), [] {
+                      return Progress::Screen{.columns = 100, .rows = 40, .colour = false};
+                    }};
+  progress.point(point_of(0));
+  progress.update(1, 1000);
+  const std::string picture = stream.str();
+  EXPECT_THAT(picture, HasSubstr("2/20"));
+  EXPECT_THAT(picture, testing::Not(testing::ContainsRegex("\033\\[[0-9]+m")));
+}
+
 TEST(Progress, SaysNothingWhenToldSo) {
   std::ostringstream stream;
-  Progress progress{stream, Progress::Style::none, plan_of(20), 100};
+  Progress progress{stream, Progress::Style::none, plan_of(20), wide};
   progress.point(point_of(0));
   progress.update(1, 1000);
   progress.close();
