@@ -10,7 +10,7 @@ namespace sinerig::record {
 class SpareRoom {
  public:
   // Some twenty pages of the log, ten times what the last words have taken.
-  static constexpr std::size_t bytes = 256 * 1024;
+  static constexpr std::size_t bytes = std::size_t{256} * 1024;
 
   // Takes the room, in a file NAME-spare beside the sweep file. Throws SweepFileError when there is
   // none: then a run had better not begin.
