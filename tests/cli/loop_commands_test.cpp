@@ -272,8 +272,8 @@ TEST(MarginsCommand, SearchesTheModelToWhereItsPhaseCrosses) {
     csv += line;
   }
   workshop.write("axis.csv", csv);
-  const auto model_of = [&](const std::string& pid) {
-    const auto run = workshop.sinerig("margins axis.csv --json --pid " + pid);
+  const auto model_of = [&](const std::string& gains) {
+    const auto run = workshop.sinerig("margins axis.csv --json --pid " + gains);
     EXPECT_EQ(run.exit_code, 0) << run.errors;
     return json::parse(run.output)["model"];
   };
