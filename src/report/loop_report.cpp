@@ -102,7 +102,8 @@ void print_loop(std::ostream& stream, const std::string& title,
     print_line(stream, "delay margin, ms", delay.delay_s, delay.frequency_hz.value,
                delay.between_hz, 1e3);
   } else {
-    stream << format("  %-22s", "phase margin, deg") << "      none, the gain does not cross 1\n";
+    stream << format("  %-22s      none, the gain does not cross 1 up to %.5g Hz\n",
+                     "phase margin, deg", figures.searched_to_hz);
   }
   for (const identify::PhaseMargin& each : figures.gain_crossings)
     stream << format("  %-22s", "gain crossover, Hz") << interval_text(each.frequency_hz)

@@ -285,6 +285,8 @@ TEST(MarginsCommand, SearchesTheModelToWhereItsPhaseCrosses) {
   EXPECT_LT(thirty["gain_margin"]["margin_db"]["value"].get<double>(), -20.0);
   const auto points = workshop.sinerig("margins axis.csv --points-only --pid 1,0,0");
   EXPECT_THAT(points.output, HasSubstr("does not cross 180° up to 20 Hz"));
+  EXPECT_THAT(workshop.sinerig("margins axis.csv --points-only --pid 30,0,0").output,
+              HasSubstr("does not cross 1 up to 20 Hz"));
 }
 
 TEST(MarginsCommand, TakesUnitsThatLookWrongWhenToldTo) {
