@@ -71,6 +71,8 @@ CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
   margins->add_flag("--points-only", options.points_only, "leave the model out");
   margins->add_flag("--refit", options.refit, "fit anew even if the sweep file holds a fit");
   margins->add_flag("--json", options.json, "print one JSON object");
+  margins->add_flag("--trust-units", options.loop.trust_units,
+                    "take a CSV whose units look wrong as it stands");
   return margins;
 }
 
@@ -105,6 +107,8 @@ CLI::App* add_notch(CLI::App& app, NotchOptions& options) {
   add_loop_options(*notch, options.loop);
   notch->add_option("--channel", options.channel, "sensor of a sweep file (default: the first)");
   notch->add_flag("--refit", options.refit, "fit anew even if the sweep file holds a fit");
+  notch->add_flag("--trust-units", options.loop.trust_units,
+                  "take a CSV whose units look wrong as it stands");
   return notch;
 }
 

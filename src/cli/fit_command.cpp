@@ -119,13 +119,34 @@ identify::Fit fitted(const Measured& measured, identify::FitOptions options) {
   return fit;
 }
 
+void refuse_bands(const FitCommandOptions& options) {
+  if (options.bands)
+    throw std::invalid_argument("--bands belongs to --method choe; --method " + options.method +
+                                " fits all points at once");
+}
+
+// Of the papers' methods: their least squares are linear and know no such conditions.
+void refuse_conditions(const FitCommandOptions& options) {
+  const auto refuse = [&](bool given, const std::string& option) {
+    if (given)
+      throw std::invalid_argument(option + " belongs to --method ml; --method " + options.method +
+                                  " cannot keep to it");
+  };
+  refuse(options.stable, "--stable");
+  refuse(options.minimum_phase, "--minimum-phase");
+  refuse(!options.given_poles_rad_s.empty(), "--given-pole");
+  refuse(options.static_gain.has_value(), "--static-gain");
+}
+
 void fit_by_likelihood(const FitCommandOptions& options, const Measured& measured,
                        report::FitReport& report) {
   if (options.weights.given())
     throw std::invalid_argument("--weights belongs to --method hassul; ml weighs by the scatter");
+  refuse_bands(options);
   identify::FitOptions fit = fit_options(options, measured);
   const bool given = options.zeros && options.poles;
-  if (given && options.order != "auto") {
+  const bool proper = measured.hold_period_s == 0.0 || !given || *options.zeros <= *options.poles;
+  if (given && options.order != "auto" && (options.origin || !proper)) {
     fit.zeros = *options.zeros;
     fit.poles = *options.poles;
     fit.origin = options.origin.value_or(0);
@@ -165,9 +186,9 @@ void look_at_stability(const FitCommandOptions& options, const Measured& measure
   if (!options.stable_in_open_loop || options.method != "ml") {
     spdlog::warn(
         "the model is unstable (poles in the right half plane at {}), but what was swept in open "
-        "loop without running away is not: margins of this model mislead; fit with --stable, or "
+        "loop without running away is not: margins of this model mislead; fit with {}--stable, or "
         "with lower orders",
-        growing);
+        growing, options.method == "ml" ? "" : "--method ml ");
     return;
   }
   spdlog::info("the free fit has poles in the right half plane at {}; fitting with --stable",
@@ -220,6 +241,8 @@ void fit_by_paper(const FitCommandOptions& options, const Measured& measured,
                                 " needs the orders; give --zeros and --poles, or use --method ml");
   if (options.method == "choe" && options.weights.given())
     throw std::invalid_argument("--method choe makes its own weights; leave --weights out");
+  refuse_conditions(options);
+  if (options.method != "choe") refuse_bands(options);
   identify::FitOptions fit = fit_options(options, measured);
   fit.model_error = options.model_error.value_or(0.0);
   if (fit.delay == identify::Delay::fit) {

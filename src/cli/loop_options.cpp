@@ -10,6 +10,7 @@
 #include <spdlog/spdlog.h>
 
 #include "identify/hold.h"
+#include "identify/loop_analysis.h"
 #include "identify/polynomial.h"
 
 namespace sinerig::cli {
@@ -36,6 +37,11 @@ std::string listed(const std::vector<double>& values) {
 Complex controller_at(const identify::ZerosPolesGain& controller, double rate_hz, double omega) {
   if (rate_hz <= 0.0) return controller.at(omega);
   return controller.at(Complex{0.0, 2.0 * rate_hz * std::tan(0.5 * omega / rate_hz)});
+}
+
+identify::Curve measured_controller(const LoopOptions& options) {
+  return identify::Curve::of_points(
+      read_fit_input(options.controller_file, "", options.trust_units).response);
 }
 
 }  // namespace
@@ -120,19 +126,31 @@ identify::Curve measured_loop(const LoopOptions& options, const FitInput& measur
                       s * s * rr + 2.0 * c * s * ri + c * c * ii});
   }
   identify::Curve loop = identify::Curve::of_points(points);
-  if (options.controller_file.empty()) return loop;
-  return loop.times(
-      identify::Curve::of_points(read_fit_input(options.controller_file, "").response));
+  return options.controller_file.empty() ? loop : loop.times(measured_controller(options));
+}
+
+identify::Curve searched_curve(const identify::LoopModel& loop, const PlantModel& plant) {
+  const identify::Response& points = plant.measured.response;
+  const double first = points.front().omega_rad_s / beyond_measured;
+  const double limit = loop.highest_rad_s();
+  for (double last = points.back().omega_rad_s * beyond_measured;; last *= beyond_measured) {
+    identify::Curve curve = loop.curve(first, last, plant.scatter());
+    const auto crossings = identify::analyse_loop(curve).phase_crossings;
+    const bool crosses =
+        std::any_of(crossings.begin(), crossings.end(),
+                    [](const identify::GainMargin& each) { return each.frequency_hz.value > 0.0; });
+    if (crosses || last >= limit) return curve;
+  }
 }
 
 identify::Curve model_curve(const LoopOptions& options, const PlantModel& plant) {
+  const identify::LoopModel loop = model_loop(options, plant);
+  if (options.controller_file.empty()) return searched_curve(loop, plant);
   const identify::Response& points = plant.measured.response;
-  const double first = points.front().omega_rad_s / beyond_measured;
-  const double last = points.back().omega_rad_s * beyond_measured;
-  identify::Curve loop = model_loop(options, plant).curve(first, last, plant.scatter());
-  if (options.controller_file.empty()) return loop;
-  return loop.times(
-      identify::Curve::of_points(read_fit_input(options.controller_file, "").response));
+  return loop
+      .curve(points.front().omega_rad_s / beyond_measured,
+             points.back().omega_rad_s * beyond_measured, plant.scatter())
+      .times(measured_controller(options));
 }
 
 }  // namespace sinerig::cli

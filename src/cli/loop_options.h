@@ -18,6 +18,7 @@ struct LoopOptions {
   std::optional<double> rate_hz;  // of the controller; 0: continuous; default: that of the sweep
   std::optional<double> hold_hz;  // the plant was measured behind; 0: none; default: the file's
   double delay_s = 0.0;           // of the loop, beside the plant's
+  bool trust_units = false;       // of CSV files
 };
 
 // The controller that num/den or pid name, 1 without either, and whether one is named.
@@ -39,7 +40,11 @@ identify::LoopModel model_loop(const LoopOptions& options, const PlantModel& pla
 // that of the loop.
 identify::Curve measured_loop(const LoopOptions& options, const FitInput& measured);
 
-// L of the model around a measured controller.
+// L of a model over three times the measured range, and further up to where its phase first crosses
+// 180°, as far as that can be.
+identify::Curve searched_curve(const identify::LoopModel& loop, const PlantModel& plant);
+
+// L of the model, around a measured controller where there is one.
 identify::Curve model_curve(const LoopOptions& options, const PlantModel& plant);
 
 }  // namespace sinerig::cli

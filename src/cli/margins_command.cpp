@@ -38,7 +38,7 @@ int margins_command(const MarginsOptions& options) {
   if (!plant && has_controller(options.loop))
     throw std::invalid_argument("--response " + options.response +
                                 " holds the controller already; leave it out");
-  FitInput measured = read_fit_input(options.file, options.channel);
+  FitInput measured = read_fit_input(options.file, options.channel, options.loop.trust_units);
   if (options.loop.hold_hz) take_hold(measured, *options.loop.hold_hz);
   if (plant) warn_of_unknown_hold(options.loop, measured);
   identify::check_response(measured.response, 2);
@@ -67,8 +67,8 @@ int margins_command(const MarginsOptions& options) {
     std::cout << "; in brackets 95 % intervals\n\n";
   }
   if (plant && !options.points_only) {
-    PlantModel model =
-        read_plant_model(options.file, options.channel, options.refit, options.loop.hold_hz);
+    PlantModel model = read_plant_model(options.file, options.channel, options.refit,
+                                        options.loop.hold_hz, options.loop.trust_units);
     if (options.negate) model.zpk.gain = -model.zpk.gain;
     std::optional<bool> stable;
     if (options.loop.controller_file.empty())

@@ -78,10 +78,7 @@ identify::UncertainMode interval_of(const NotchOptions& options,
 }
 
 identify::LoopFigures figures_of(const identify::LoopModel& loop, const PlantModel& plant) {
-  const identify::Response& points = plant.measured.response;
-  const identify::Curve curve = loop.curve(points.front().omega_rad_s / 3.0,
-                                           points.back().omega_rad_s * 3.0, plant.scatter());
-  return identify::analyse_loop(curve, loop.closed_loop_stable());
+  return identify::analyse_loop(searched_curve(loop, plant), loop.closed_loop_stable());
 }
 
 identify::NotchRequest request_for(const NotchOptions& options, const identify::UncertainMode& mode,
@@ -123,7 +120,8 @@ NotchedLoop design_notches(const NotchOptions& options) {
     throw std::invalid_argument("notch needs the controller as a transfer function or PID");
   std::vector<PlantModel> plants;
   for (const std::string& file : options.files)
-    plants.push_back(read_plant_model(file, options.channel, options.refit, options.loop.hold_hz));
+    plants.push_back(read_plant_model(file, options.channel, options.refit, options.loop.hold_hz,
+                                      options.loop.trust_units));
   const PlantModel& plant = plants.front();
   warn_of_unknown_hold(options.loop, plant.measured);
   const auto [bits, fraction_bits] = fixed_format(options.fixed);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <numbers>
 #include <optional>
 
@@ -25,12 +26,12 @@ std::complex<double> complex_of(const Json& pair) {
 }
 
 // A figure that is not finite is stored as null.
-double number_or_zero(const Json& value) {
-  return value.is_number() ? value.get<double>() : 0.0;
+double number_or_nan(const Json& value) {
+  return value.is_number() ? value.get<double>() : std::numeric_limits<double>::quiet_NaN();
 }
 
 identify::Estimate estimate_of(const Json& json) {
-  return {number_or_zero(json.at("value")), number_or_zero(json.at("standard_error"))};
+  return {number_or_nan(json.at("value")), number_or_nan(json.at("standard_error"))};
 }
 
 void read_json(const Json& json, PlantModel& model) {
@@ -54,17 +55,18 @@ void read_json(const Json& json, PlantModel& model) {
   for (Eigen::Index i = 0; i < size; ++i)
     for (Eigen::Index k = 0; k < size; ++k)
       model.root_covariance.covariance(i, k) =
-          number_or_zero(rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(k)));
+          number_or_nan(rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(k)));
   if (size != identify::coordinates_of(model.zpk))
     throw InputError("the covariance does not belong to the roots");
 }
 
 std::string fitted(const std::string& file, const std::string& channel, const std::string& hold,
-                   bool store) {
+                   bool trust_units, bool store) {
   FitCommandOptions options;
   options.files = {file};
   options.channel = channel;
   options.hold = hold;
+  options.trust_units = trust_units;
   options.stable_in_open_loop = true;
   options.no_store = !store;
   const report::FitReport report = fit_files(options);
@@ -83,8 +85,26 @@ std::string hold_text(double rate_hz) {
 bool same_hold(const std::string& fit, double rate_hz) {
   const Json json = Json::parse(fit, nullptr, false);
   if (!json.is_object() || !json.contains("hold_period_s")) return true;
-  const double held = number_or_zero(json["hold_period_s"]) * rate_hz;
-  return rate_hz > 0.0 ? std::abs(held - 1.0) < 1e-9 : number_or_zero(json["hold_period_s"]) == 0.0;
+  const double held = number_or_nan(json["hold_period_s"]) * rate_hz;
+  return rate_hz > 0.0 ? std::abs(held - 1.0) < 1e-9 : number_or_nan(json["hold_period_s"]) == 0.0;
+}
+
+// A run that was interrupted and fitted, then resumed, has points that its fit knows nothing of. A
+// joint fit has those of other files, too.
+bool knows_points(const std::string& fit, const identify::Response& points) {
+  constexpr double same = 1e-6;  // part of a frequency
+  const Json json = Json::parse(fit, nullptr, false);
+  if (!json.is_object() || !json.contains("response") || !json["response"].is_array()) return true;
+  std::vector<double> fitted_hz;
+  for (const Json& point : json["response"])
+    if (point.is_object() && point.contains("freq_hz"))
+      fitted_hz.push_back(number_or_nan(point["freq_hz"]));
+  std::sort(fitted_hz.begin(), fitted_hz.end());
+  return std::all_of(points.begin(), points.end(), [&](const identify::ResponsePoint& point) {
+    const double hz = point.omega_rad_s / (2.0 * std::numbers::pi);
+    const auto next = std::lower_bound(fitted_hz.begin(), fitted_hz.end(), hz * (1.0 - same));
+    return next != fitted_hz.end() && *next <= hz * (1.0 + same);
+  });
 }
 
 void warn_of_stored(const std::string& file, const Json& json, const PlantModel& model) {
@@ -102,14 +122,19 @@ void warn_of_stored(const std::string& file, const Json& json, const PlantModel&
 }  // namespace
 
 PlantModel read_plant_model(const std::string& file, const std::string& channel, bool refit,
-                            std::optional<double> hold_hz) {
+                            std::optional<double> hold_hz, bool trust_units) {
   PlantModel model;
-  model.measured = read_fit_input(file, channel);
+  model.measured = read_fit_input(file, channel, trust_units);
   if (hold_hz) take_hold(model.measured, *hold_hz);
   std::optional<std::string> json;
   if (model.measured.sweep_file && !refit)
     json = record::last_fit(file, model.measured.input, model.measured.output);
   bool store = !hold_hz;
+  if (json && !knows_points(*json, model.measured.response)) {
+    spdlog::info("{} has points that its stored fit was made without; fitting it again", file);
+    json.reset();
+    refit = true;
+  }
   if (json && !same_hold(*json, model.measured.hold_hz)) {
     spdlog::info(
         "the stored fit of {} was made with another hold than that of its loop; fitting it again "
@@ -121,7 +146,7 @@ PlantModel read_plant_model(const std::string& file, const std::string& channel,
     spdlog::info("{} holds no fit; fitting it first, order chosen by itself", file);
   }
   const bool stored = json.has_value();
-  if (!json) json = fitted(file, channel, hold_text(model.measured.hold_hz), store);
+  if (!json) json = fitted(file, channel, hold_text(model.measured.hold_hz), trust_units, store);
   const Json parsed = Json::parse(*json, nullptr, false);
   try {
     read_json(parsed, model);

@@ -74,7 +74,8 @@ void enforce_constraints(const FitData& data, const Freedom& freedom, Refined& r
     }
     const Refined constrained = refine(data, freedom, start, most_iterations);
     iterations += constrained.iterations;
-    if (constrained.rational.cost < best.rational.cost) best = constrained;
+    if (best.rational.N.size() == 0 || constrained.rational.cost < best.rational.cost)
+      best = constrained;
   }
   refined = best;
   refined.iterations = iterations;

@@ -26,16 +26,11 @@ double chi2_quantile(int degrees_of_freedom, double z) {
 }
 
 struct Linearised {
-  MatrixXd covariance;  // of the free parameters, for unit noise
+  MatrixXd factor;  // of the covariance of the free parameters for unit noise: factor·factor'
   double condition;
 };
 
-struct Inverse {
-  MatrixXd half;  // covariance of unit noise: half·half'
-  double condition;
-};
-
-Inverse invert(const MatrixXd& J) {
+Linearised linearise(const MatrixXd& J) {
   const Index parameters = J.cols();
   if (parameters == 0) return {MatrixXd(0, 0), 1.0};  // everything given
   const VectorXd size = J.colwise().norm().cwiseMax(1e-300);
@@ -49,16 +44,11 @@ Inverse invert(const MatrixXd& J) {
   return {size.cwiseInverse().asDiagonal() * inverse, singular[0] / singular[parameters - 1]};
 }
 
-Linearised linearise(const MatrixXd& J) {
-  const Inverse inverse = invert(J);
-  return {inverse.half * inverse.half.transpose(), inverse.condition};
-}
-
 // Unit noise of the whitened residual as it reaches the residual weighted otherwise.
 Linearised linearise(const MatrixXd& J, const FitData& white, const FitData& weighted) {
   const Index g = white.points();
-  const Inverse inverse = invert(J);
-  const MatrixXd pseudo = inverse.half * (inverse.half.transpose() * J.transpose());
+  const Linearised inverse = linearise(J);
+  const MatrixXd pseudo = inverse.factor * (inverse.factor.transpose() * J.transpose());
   // e = (top, bottom)/whitening, weighted without correlation.
   const Eigen::ArrayXd top = weighted.w_rr / white.w_rr;
   const Eigen::ArrayXd across = -weighted.w_ii * white.w_ir / (white.w_rr * white.w_ii);
@@ -67,14 +57,13 @@ Linearised linearise(const MatrixXd& J, const FitData& white, const FitData& wei
   reached.leftCols(g) = pseudo.leftCols(g) * top.matrix().asDiagonal();
   reached.leftCols(g) += pseudo.rightCols(g) * across.matrix().asDiagonal();
   reached.rightCols(g) = pseudo.rightCols(g) * bottom.matrix().asDiagonal();
-  return {reached * reached.transpose(), inverse.condition};
+  return {reached, inverse.condition};
 }
 
 std::vector<double> root_diagonal(const MatrixXd& covariance, Index first, std::size_t count) {
   std::vector<double> errors;
   for (std::size_t i = 0; i < count; ++i)
-    errors.push_back(
-        std::sqrt(std::max(0.0, covariance.diagonal()[first + static_cast<Index>(i)])));
+    errors.push_back(std::sqrt(covariance.diagonal()[first + static_cast<Index>(i)]));
   return errors;
 }
 
@@ -106,11 +95,10 @@ Fit describe(const FitSetup& setup, const FitData& data, const Refined& refined,
                    : "the limit of iterations was reached; the orders may be too high";
   const double variance =
       data.scatter_known || fit.degrees_of_freedom < 1 ? 1.0 : fit.chi2 / fit.degrees_of_freedom;
-  const MatrixXd spread = model.spread_to_full();
-  const MatrixXd covariance = variance * spread * linearised.covariance * spread.transpose();
+  const MatrixXd factor = std::sqrt(variance) * model.spread_to_full() * linearised.factor;
   const auto parameters = std::make_shared<const ParameterCovariance>(
       model.N_basis(), model.D_basis(), model.parameters().n, model.parameters().d, data.scale,
-      model.parameters().delay_s, setup.fixed, covariance);
+      model.parameters().delay_s, setup.fixed, factor);
   fit.parameters = parameters;
   fit.zpk = parameters->zpk();
   fit.model = to_transfer_function(fit.zpk);

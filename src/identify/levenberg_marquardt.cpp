@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Cholesky>
 
@@ -35,7 +36,10 @@ Refined refine(const FitData& data, const Freedom& freedom, const GridRational& 
     LocalModel model(data, freedom, refined.rational);
     VectorXd residual = model.residual(model.parameters());
     double cost = residual.squaredNorm();
-    if (!std::isfinite(cost)) break;
+    if (!std::isfinite(cost)) {
+      refined.rational.cost = std::numeric_limits<double>::infinity();
+      break;
+    }
     for (int accepted = 0; accepted < steps_per_basis && !refined.converged; ++accepted) {
       const MatrixXd J = model.jacobian();
       MatrixXd JtJ = MatrixXd::Zero(J.cols(), J.cols());

@@ -19,13 +19,13 @@ const double db_per_neper = 20.0 / std::log(10.0);
 constexpr double least_rise_db = 3.0;
 
 Bounded bounded(double value, double variance) {
-  const double half = z95 * std::sqrt(std::max(0.0, variance));
+  const double half = z95 * std::sqrt(std::max(variance, 0.0));
   return {value, value - half, value + half};
 }
 
 // For ratios and frequencies, which scatter on a logarithmic scale.
 Bounded bounded_ratio(double value, double relative_variance) {
-  const double half = z95 * std::sqrt(std::max(0.0, relative_variance));
+  const double half = z95 * std::sqrt(std::max(relative_variance, 0.0));
   return {value, value * std::exp(-half), value * std::exp(half)};
 }
 
@@ -126,13 +126,32 @@ void find_crossings(const Curve& loop, LoopFigures& figures) {
   }
 }
 
+// At such an end the phase need not pass through 180°, but L passes through −1 as its gain changes.
+void add_real_ends(const Curve& loop, LoopFigures& figures) {
+  constexpr double real = 1e-6;  // part of the magnitude that is rounding
+  for (const double omega : loop.real_ends()) {
+    const CurvePoint L = loop.at(omega);
+    if (!std::isfinite(std::abs(L.value)) || !(L.value.real() < 0.0) ||
+        std::abs(L.value.imag()) > real * std::abs(L.value))
+      continue;
+    const double hz = omega / turn;
+    const GainMargin end{{hz, hz, hz},
+                         bounded(-db_per_neper * std::log(std::abs(L.value)),
+                                 L.scatter.variance_along(1.0) * db_per_neper * db_per_neper),
+                         std::nullopt};
+    auto& all = figures.phase_crossings;
+    all.insert(omega == 0.0 ? all.begin() : all.end(), end);
+  }
+}
+
 void choose_margins(std::optional<bool> stable, LoopFigures& figures) {
   const double crossover_hz =
       figures.gain_crossings.empty() ? 0.0 : figures.gain_crossings.front().frequency_hz.value;
   for (const GainMargin& each : figures.phase_crossings) {
     const double margin = each.margin_db.value;
     const bool reduces =
-        margin < 0.0 && (stable.value_or(false) || each.frequency_hz.value < crossover_hz);
+        margin < 0.0 && (stable.value_or(false) ||
+                         (each.frequency_hz.value > 0.0 && each.frequency_hz.value < crossover_hz));
     auto& least = reduces ? figures.gain_reduction : figures.gain_margin;
     if (!least || (reduces ? margin > least->margin_db.value : margin < least->margin_db.value))
       least = each;
@@ -219,7 +238,9 @@ std::vector<Resonance> resonances(const Curve& curve) {
 
 LoopFigures analyse_loop(const Curve& loop, std::optional<bool> stable) {
   LoopFigures figures;
+  figures.searched_to_hz = loop.grid().back() / turn;
   find_crossings(loop, figures);
+  add_real_ends(loop, figures);
   choose_margins(stable, figures);
   figures.sensitivity_peak = peak_of_sensitivity(loop);
   find_bandwidth(loop, figures);

@@ -51,7 +51,9 @@ struct Resonance {
 };
 
 struct LoopFigures {
-  std::vector<GainMargin> phase_crossings;  // all, by rising frequency
+  double searched_to_hz = 0.0;
+  // All, by rising frequency; where L is real at 0 or half the rate, and negative, that counts.
+  std::vector<GainMargin> phase_crossings;
   std::vector<PhaseMargin> gain_crossings;
   // Of a loop that is known to be stable: the least rise of the gain that ends that. Otherwise the
   // least margin at or above the first gain crossover, below zero where L encloses −1 there.

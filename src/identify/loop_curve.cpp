@@ -5,6 +5,7 @@
 #include <memory>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
 
 namespace sinerig::identify {
 
@@ -73,10 +74,11 @@ std::vector<double> merged_grid(const std::vector<double>& a, const std::vector<
 
 }  // namespace
 
+// In this order std::max lets a variance that is not a number through.
 double LogScatter::variance_along(Complex factor) const {
   const double re = factor.real();
   const double im = factor.imag();
-  return std::max(0.0, re * re * gain - 2.0 * re * im * both + im * im * phase);
+  return std::max(re * re * gain - 2.0 * re * im * both + im * im * phase, 0.0);
 }
 
 LogScatter LogScatter::operator+(const LogScatter& other) const {
@@ -131,6 +133,12 @@ std::optional<std::pair<double, double>> Curve::neighbours(double omega_rad_s) c
   if (right == measured_.end()) return std::pair{measured_.back(), measured_.back()};
   if (*right == omega_rad_s || right == measured_.begin()) return std::pair{*right, *right};
   return std::pair{*(right - 1), *right};
+}
+
+Curve Curve::with_real_ends(std::vector<double> omega_rad_s) const {
+  Curve ended = *this;
+  ended.real_ends_ = std::move(omega_rad_s);
+  return ended;
 }
 
 Curve Curve::times(const Curve& other) const {

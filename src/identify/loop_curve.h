@@ -47,6 +47,11 @@ class Curve {
   std::complex<double> value(double omega_rad_s) const { return value_(omega_rad_s); }
   const std::vector<double>& grid() const { return grid_; }
 
+  // Frequencies in rad/s at the ends of what there is, 0 or half a rate, where the response is
+  // real: it may lie on the negative axis there without crossing it.
+  const std::vector<double>& real_ends() const { return real_ends_; }
+  Curve with_real_ends(std::vector<double> omega_rad_s) const;
+
   // The measured frequencies, rad/s, between which a value at omega is interpolated.
   std::optional<std::pair<double, double>> neighbours(double omega_rad_s) const;
 
@@ -62,6 +67,7 @@ class Curve {
   Scatter scatter_;
   std::vector<double> grid_;
   std::vector<double> measured_;  // rad/s; empty for a model
+  std::vector<double> real_ends_;
 };
 
 // Logarithmic from first to last, rad/s, and close to each of the roots as their damping asks.

@@ -13,7 +13,8 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr double pi = std::numbers::pi;
-constexpr double least_step_rad = 0.5;  // of the argument, between two frequencies
+constexpr double below_half = 1.0 - 1e-6;  // of the rate: as near as the search goes
+constexpr double least_step_rad = 0.5;     // of the argument, between two frequencies
 
 double slowest_and_fastest(const std::vector<Complex>& roots, bool fastest) {
   double found = 0.0;
@@ -113,11 +114,15 @@ Complex LoopModel::moved(double omega_rad_s) const {
   return value;
 }
 
+double LoopModel::highest_rad_s() const {
+  return rate_hz_ > 0.0 ? pi * rate_hz_ * below_half
+                        : 1e3 * slowest_and_fastest(open_loop_roots(), true);
+}
+
 bool LoopModel::closed_loop_stable() const {
   const std::vector<Complex> roots = open_loop_roots();
   const double first = 1e-3 * slowest_and_fastest(roots, false);
-  double last = 1e3 * slowest_and_fastest(roots, true);
-  if (rate_hz_ > 0.0) last = pi * rate_hz_ * (1.0 - 1e-6);
+  const double last = highest_rad_s();
   const std::vector<double> grid = model_grid(std::min(first, 0.1 * last), last, roots);
   const auto F = [this](double omega) {
     return moved(omega);
@@ -135,9 +140,17 @@ bool LoopModel::closed_loop_stable() const {
 
 Curve LoopModel::curve(double first_rad_s, double last_rad_s, const Curve::Scatter& scatter) const {
   double last = last_rad_s;
-  if (rate_hz_ > 0.0) last = std::min(last, pi * rate_hz_ * (1.0 - 1e-6));
+  std::vector<double> real_ends;
+  const std::vector<Complex> roots = open_loop_roots();
+  if (std::none_of(roots.begin(), roots.end(), [](Complex root) { return root == 0.0; }))
+    real_ends.push_back(0.0);
+  if (rate_hz_ > 0.0 && last >= pi * rate_hz_ * below_half) {
+    last = pi * rate_hz_ * below_half;
+    real_ends.push_back(pi * rate_hz_);
+  }
   return Curve::of_model([loop = *this](double omega) { return loop.at(omega); }, scatter,
-                         model_grid(first_rad_s, last, open_loop_roots()));
+                         model_grid(first_rad_s, last, roots))
+      .with_real_ends(real_ends);
 }
 
 }  // namespace sinerig::identify

@@ -33,6 +33,9 @@ class LoopModel {
   // the axis need no detour.
   bool closed_loop_stable() const;
 
+  // The highest frequency that has anything to say: half the rate, or far above every root.
+  double highest_rad_s() const;
+
   // L with the relative scatter of the plant; the controller is exact. scatter: of the plant.
   // The range is that of the frequencies searched, cut below half the rate.
   Curve curve(double first_rad_s, double last_rad_s, const Curve::Scatter& scatter) const;

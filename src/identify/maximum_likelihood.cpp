@@ -182,6 +182,13 @@ void weigh_by_model(Solution& solution, const Freedom& freedom) {
   }
 }
 
+[[noreturn]] void refuse_infinite(const FitOptions& options) {
+  throw std::invalid_argument(
+      "fit: the model of " + std::to_string(options.zeros) + " zeros and " +
+      std::to_string(options.poles) +
+      " poles is not finite at every measured frequency; lower the orders or check the units");
+}
+
 }  // namespace
 
 Fit fit_maximum_likelihood(const Response& response, const FitOptions& options) {
@@ -205,11 +212,7 @@ Fit fit_maximum_likelihood(const Response& response, const FitOptions& options) 
   const bool finite = std::ranges::all_of(response, [&](const ResponsePoint& point) {
     return std::isfinite(std::norm(fit.zpk.at(point.omega_rad_s)));
   });
-  if (!finite || !std::isfinite(fit.chi2))
-    throw std::invalid_argument(
-        "fit: the model of " + std::to_string(options.zeros) + " zeros and " +
-        std::to_string(options.poles) +
-        " poles is not finite at every measured frequency; lower the orders or check the units");
+  if (!finite || !std::isfinite(fit.chi2)) refuse_infinite(options);
   return fit;
 }
 

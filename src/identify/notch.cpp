@@ -111,7 +111,8 @@ double Notch::depth_db() const {
 }
 
 double Notch::width_hz() const {
-  return 2.0 * pole_damping * frequency_hz;
+  if (!(rate_hz > 0.0)) return 2.0 * pole_damping * frequency_hz;
+  return rate_hz / pi * std::atan(pole_damping * std::sin(turn * frequency_hz / rate_hz));
 }
 
 double Notch::phase_deg(double frequency) const {

@@ -32,7 +32,8 @@ struct Notch {
 
   std::complex<double> at(double omega_rad_s) const;
   double depth_db() const;  // at the centre: 20 log10(zero_damping/pole_damping), below zero
-  double width_hz() const;  // between the −3 dB frequencies of a deep notch: 2·pole_damping·f
+  // Between the −3 dB frequencies of a deep notch: 2·pole_damping·f, and less of a discrete one.
+  double width_hz() const;
   double phase_deg(double frequency) const;  // negative below the centre; frequency in Hz
   // Poles of the filter in rad/s, and its zeros (continuous form).
   ZerosPolesGain zpk() const;

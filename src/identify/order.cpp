@@ -31,8 +31,8 @@ constexpr int orders_above_the_lowest = 2;
 constexpr int subsets_per_order = 4;
 // The images of the hold are those of the last trial at first, so few passes are left to do.
 constexpr int image_passes = 2;
-// Images that change the response by less than this part of its scatter, or of what the trial leaves,
-// have settled.
+// Images that change the response by less than this part of its scatter, or of what the trial
+// leaves, have settled.
 constexpr double settled_images = 0.03;
 // Steps with the hold in the model: what a structure of too many parameters gains after them is
 // nothing to choose it by.
@@ -105,12 +105,13 @@ class Selector {
 
   // Of the order below the lowest one the sweep has tried all but as many zeros as poles.
   void sweep_structures() {
-    const int first = std::max(lowest_ - 1, first_order());
-    const int last = std::min(lowest_ + orders_above_the_lowest, last_order());
+    const int lowest = settings_.poles.value_or(lowest_);
+    const int first = std::max(lowest - 1, first_order());
+    const int last = std::max(first, std::min(lowest + orders_above_the_lowest, last_order()));
     for (int poles = first; poles <= last; ++poles)
       for (int origin = settings_.origin.value_or(0);
            origin <= settings_.origin.value_or(settings_.most_origin); ++origin)
-        for (int fall = 0; fall <= (poles < lowest_ ? 0 : settings_.most_relative_degree); ++fall) {
+        for (int fall = 0; fall <= (poles < lowest ? 0 : settings_.most_relative_degree); ++fall) {
           const int zeros = settings_.zeros.value_or(poles - fall);
           const Structure structure{zeros, poles, origin};
           if (!possible(structure) || known(structure)) continue;

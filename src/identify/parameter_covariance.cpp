@@ -38,7 +38,7 @@ MatrixXd multiplied(const MatrixXd& rows, const std::vector<double>& factor) {
 
 ParameterCovariance::ParameterCovariance(OrthonormalBasis N_basis, OrthonormalBasis D_basis,
                                          VectorXd n, VectorXd d, double scale, double delay_s,
-                                         ZerosPolesGain fixed, MatrixXd covariance)
+                                         ZerosPolesGain fixed, MatrixXd factor)
     : N_basis_(std::move(N_basis)),
       D_basis_(std::move(D_basis)),
       n_(std::move(n)),
@@ -46,7 +46,7 @@ ParameterCovariance::ParameterCovariance(OrthonormalBasis N_basis, OrthonormalBa
       scale_(scale),
       delay_s_(delay_s),
       fixed_(std::move(fixed)),
-      covariance_(std::move(covariance)),
+      factor_(std::move(factor)),
       zpk_(compose(N_basis_, n_, D_basis_, d_, scale_, delay_s_, fixed_)) {}
 
 ParameterCovariance::Row ParameterCovariance::response_sensitivity(Complex s) const {
@@ -61,11 +61,9 @@ ParameterCovariance::Row ParameterCovariance::response_sensitivity(Complex s) co
 }
 
 RootEstimate ParameterCovariance::with_covariance(Complex value, const Row& sensitivity) const {
-  const Eigen::RowVectorXd re = sensitivity.real();
-  const Eigen::RowVectorXd im = sensitivity.imag();
-  const Eigen::RowVectorXd re_covariance = re * covariance_;
-  return {value, std::max(0.0, re_covariance.dot(re)), re_covariance.dot(im),
-          std::max(0.0, (im * covariance_).dot(im))};
+  const Eigen::RowVectorXd re = sensitivity.real() * factor_;
+  const Eigen::RowVectorXd im = sensitivity.imag() * factor_;
+  return {value, re.squaredNorm(), re.dot(im), im.squaredNorm()};
 }
 
 ResponsePoint ParameterCovariance::response(double omega_rad_s) const {
@@ -75,8 +73,7 @@ ResponsePoint ParameterCovariance::response(double omega_rad_s) const {
 }
 
 Estimate ParameterCovariance::delay() const {
-  const Index last = covariance_.rows() - 1;
-  return {zpk_.delay_s, std::sqrt(covariance_(last, last)) / scale_};
+  return {zpk_.delay_s, factor_.row(factor_.rows() - 1).norm() / scale_};
 }
 
 Estimate ParameterCovariance::static_gain() const {
@@ -131,15 +128,14 @@ Complex ParameterCovariance::residue_along_D(Complex scaled_pole) const {
 }
 
 Mode ParameterCovariance::mode(Complex pole) const {
-  const RootEstimate p = this->pole(pole);
   const double omega = std::abs(pole);
   const double sigma = pole.real();
   const double omega_d = pole.imag();
   const double damping = -sigma / omega;
   const double cube = omega * omega * omega;
-  const auto error = [&p](double by_re, double by_im) {
-    return std::sqrt(std::max(0.0, by_re * by_re * p.variance_re + by_im * by_im * p.variance_im +
-                                       2.0 * by_re * by_im * p.covariance));
+  const Row of_pole = pole_sensitivity(pole);
+  const auto error = [&](double by_re, double by_im) {
+    return ((by_re * of_pole.real() + by_im * of_pole.imag()) * factor_).norm();
   };
   constexpr double turn = 2.0 * std::numbers::pi;
   Mode mode{{omega / turn, error(sigma, omega_d) / (omega * turn)},
@@ -157,7 +153,7 @@ Mode ParameterCovariance::mode(Complex pole) const {
       (residue_along_D(scaled + width) - residue_along_D(scaled - width)) / (2.0 * width) / scale_;
   const Eigen::VectorXcd slope_width =
       (D_basis_.all_at(scaled + width) - D_basis_.all_at(scaled - width)) / (2.0 * width);
-  Row row = pole_sensitivity(pole) * by_pole;
+  Row row = of_pole * by_pole;
   row.head(n_.size()) += N_basis_.all_at(scaled).transpose() * (mode.residue / N);
   row.segment(n_.size(), d_.size()) -= slope_width.transpose() * (mode.residue / D_slope);
   const RootEstimate residue = with_covariance(mode.residue, row);
@@ -166,8 +162,8 @@ Mode ParameterCovariance::mode(Complex pole) const {
 }
 
 MatrixXd ParameterCovariance::of_coefficients() const {
-  MatrixXd num = MatrixXd::Zero(n_.size(), covariance_.rows());
-  MatrixXd den = MatrixXd::Zero(d_.size(), covariance_.rows());
+  MatrixXd num = MatrixXd::Zero(n_.size(), factor_.rows());
+  MatrixXd den = MatrixXd::Zero(d_.size(), factor_.rows());
   num.leftCols(n_.size()) = descending_powers(N_basis_, scale_);
   den.middleCols(n_.size(), d_.size()) = descending_powers(D_basis_, scale_);
   const VectorXd num_value = num.leftCols(n_.size()) * n_;
@@ -177,14 +173,15 @@ MatrixXd ParameterCovariance::of_coefficients() const {
   den = ((den - den_value * (leading / den_value[0])) / den_value[0]).eval();
   num = multiplied(num, polynomial_from_roots(fixed_.zeros));
   den = multiplied(den, polynomial_from_roots(fixed_.poles));
-  MatrixXd map = MatrixXd::Zero(num.rows() + den.rows() + 1, covariance_.rows());
-  map << num, den, Eigen::RowVectorXd::Unit(covariance_.rows(), covariance_.rows() - 1) / scale_;
-  return map * covariance_ * map.transpose();
+  MatrixXd map = MatrixXd::Zero(num.rows() + den.rows() + 1, factor_.rows());
+  map << num, den, Eigen::RowVectorXd::Unit(factor_.rows(), factor_.rows() - 1) / scale_;
+  const MatrixXd reached = map * factor_;
+  return reached * reached.transpose();
 }
 
 RootCovariance ParameterCovariance::of_roots() const {
   RootCovariance out{scale_, {}};
-  MatrixXd map = MatrixXd::Zero(coordinates_of(zpk_), covariance_.rows());
+  MatrixXd map = MatrixXd::Zero(coordinates_of(zpk_), factor_.rows());
   Index at = 0;
   const auto add = [&](Complex root, const Row& row) {
     map.row(at++) = row.real();
@@ -196,8 +193,9 @@ RootCovariance ParameterCovariance::of_roots() const {
     if (zero.imag() >= 0.0) add(zero, zero_sensitivity(zero));
   const Complex reference{0.0, scale_};
   map.row(at++) = (response_sensitivity(reference) / zpk_.at(reference)).real();
-  map(at, covariance_.rows() - 1) = 1.0 / scale_;
-  out.covariance = map * covariance_ * map.transpose();
+  map(at, factor_.rows() - 1) = 1.0 / scale_;
+  const MatrixXd reached = map * factor_;
+  out.covariance = reached * reached.transpose();
   return out;
 }
 

@@ -14,10 +14,12 @@ namespace sinerig::identify {
 // G(s) = fixed(s) · N(s/scale)/D(s/scale) · exp(−s·delay_s), N = Σ n_k P_k, D = Σ d_k Q_k.
 class ParameterCovariance {
  public:
-  // covariance: of n, d and delay·scale, in that order.
+  // factor·factorᵀ: the covariance of n, d and delay·scale, in that order. Parameters that hardly
+  // show in the response have variances so far above its own that, formed from the product, that
+  // would be rounding, below zero as often as not; formed from the factor it is not.
   ParameterCovariance(OrthonormalBasis N_basis, OrthonormalBasis D_basis, Eigen::VectorXd n,
                       Eigen::VectorXd d, double scale, double delay_s, ZerosPolesGain fixed,
-                      Eigen::MatrixXd covariance);
+                      Eigen::MatrixXd factor);
 
   const ZerosPolesGain& zpk() const { return zpk_; }
 
@@ -36,7 +38,7 @@ class ParameterCovariance {
 
  private:
   using Row = Eigen::RowVectorXcd;
-  Row no_sensitivity() const { return Row::Zero(covariance_.rows()); }
+  Row no_sensitivity() const { return Row::Zero(factor_.rows()); }
   Row response_sensitivity(std::complex<double> s) const;
   Row pole_sensitivity(std::complex<double> pole) const;
   Row zero_sensitivity(std::complex<double> zero) const;
@@ -51,7 +53,7 @@ class ParameterCovariance {
   double scale_;
   double delay_s_;
   ZerosPolesGain fixed_;
-  Eigen::MatrixXd covariance_;
+  Eigen::MatrixXd factor_;
   ZerosPolesGain zpk_;
 };
 

@@ -136,8 +136,17 @@ ResponsePoint response_with_covariance(const ZerosPolesGain& model,
   const VectorXd re = dG.real();
   const VectorXd im = dG.imag();
   const VectorXd carried = covariance.covariance * re;
-  return {omega_rad_s, G, std::max(0.0, re.dot(carried)), im.dot(carried),
-          std::max(0.0, im.dot(covariance.covariance * im))};
+  const double variance_re = re.dot(carried);
+  const double variance_im = im.dot(covariance.covariance * im);
+  // Roots that hardly show in the response have large variances that cancel in its own; what is
+  // left of it below their rounding says nothing.
+  const double terms = dG.cwiseAbs().dot(covariance.covariance.diagonal().cwiseAbs().cwiseSqrt());
+  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() * terms * terms;
+  if (!(variance_re + variance_im >= rounding)) {
+    constexpr double none = std::numeric_limits<double>::quiet_NaN();
+    return {omega_rad_s, G, none, none, none};
+  }
+  return {omega_rad_s, G, std::max(variance_re, 0.0), im.dot(carried), std::max(variance_im, 0.0)};
 }
 
 std::vector<double> standard_errors(

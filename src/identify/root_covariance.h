@@ -30,8 +30,9 @@ Eigen::Index coordinates_of(const ZerosPolesGain& model);
 ZerosPolesGain moved(const ZerosPolesGain& model, double reference_rad_s,
                      const Eigen::VectorXd& step);
 
-// G(jω) with the covariance of (re, im), to first order. Throws std::invalid_argument when the
-// covariance does not have the size that the model asks for.
+// G(jω) with the covariance of (re, im), to first order; that is NaN where it is not finite, or
+// below the rounding of the variances of roots that the response hardly shows. Throws
+// std::invalid_argument when the covariance does not have the size that the model asks for.
 ResponsePoint response_with_covariance(const ZerosPolesGain& model,
                                        const RootCovariance& covariance, double omega_rad_s);
 

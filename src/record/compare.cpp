@@ -62,6 +62,11 @@ PointDifference difference(const StoredPoint& a, const StoredPoint& b) {
   result.gain95_db = half * db_per_relative;
   result.phase95_deg = std::isnan(half) ? nan_value : std::min(180.0, half * degrees_per_radian);
   result.probability = tail(std::norm(b.response - a.response), scatter);
+  // Of two figures one alone is as large by chance less often than both together: on the safe side.
+  const double gain = size * std::log(std::abs(ratio));
+  const double phase = size * std::arg(ratio);
+  result.gain_probability = tail(gain * gain, scatter);
+  result.phase_probability = tail(phase * phase, scatter);
   return result;
 }
 
@@ -108,10 +113,13 @@ Difference compare_responses(const StoredResponse& first, const StoredResponse& 
   const double threshold =
       settings.false_alarm / static_cast<double>(std::max<std::size_t>(1, result.points.size()));
   for (PointDifference& point : result.points) {
-    const bool beyond = std::abs(point.gain_db) > settings.tolerance_db ||
-                        std::abs(point.phase_deg) > settings.tolerance_deg;
-    const bool explained = !std::isnan(point.probability) && point.probability >= threshold;
-    point.changed = beyond && !explained && point.relative > rounding;
+    const bool gain = std::abs(point.gain_db) > settings.tolerance_db;
+    const bool phase = std::abs(point.phase_deg) > settings.tolerance_deg;
+    const double probability = gain && phase ? point.probability
+                               : gain        ? point.gain_probability
+                                             : point.phase_probability;
+    const bool explained = !std::isnan(probability) && probability >= threshold;
+    point.changed = (gain || phase) && !explained && point.relative > rounding;
   }
   return result;
 }

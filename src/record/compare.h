@@ -9,8 +9,8 @@
 namespace sinerig::record {
 
 struct CompareSettings {
-  double tolerance_db = 0.0;   // a smaller change of the gain is none …
-  double tolerance_deg = 0.0;  // … when that of the phase is smaller than this, too
+  double tolerance_db = 0.0;   // a smaller change of the gain is none
+  double tolerance_deg = 0.0;  // a smaller change of the phase is none
   double false_alarm = 0.01;   // chance to call two equal responses different, over all points
 };
 
@@ -23,6 +23,8 @@ struct PointDifference {
   double phase95_deg = 0.0;
   double relative = 0.0;     // |H_other / H_first − 1|
   double probability = 0.0;  // of a difference at least as large from scatter alone; NaN as above
+  double gain_probability = 0.0;   // the same of what the gain and the phase alone differ by,
+  double phase_probability = 0.0;  // at most
   bool changed = false;
 };
 
@@ -46,10 +48,11 @@ struct Difference {
 // Points match when their frequencies agree within 1e-6; only points with status good, or imported,
 // are compared. The scatter of each is taken as circular (circular_variance), both are added with
 // the degrees of freedom of Welch and Satterthwaite, and p = (1 + |d|²/(ν s²))^(−ν/2), the tail of
-// F(2, ν). A point has changed when p is below false_alarm divided by the number of points and the
-// change is above a tolerance; points without known scatter go by the tolerances alone, and where
-// only one scatter is known the other is taken as large. Differences of 1e-10 are rounding of a
-// file.
+// F(2, ν). A point has changed when p is below false_alarm divided by the number of points; where
+// the change of the gain or of the phase is within its tolerance only the other one counts in d,
+// and where both are nothing has changed. Points without known scatter go by the tolerances alone,
+// and where only one scatter is known the other is taken as large. Differences of 1e-10 are
+// rounding of a file.
 Difference compare_responses(const StoredResponse& first, const StoredResponse& other,
                              const CompareSettings& settings);
 

@@ -1,5 +1,6 @@
 #include "report/loop_report.h"
 
+#include <cmath>
 #include <cstdio>
 #include <ostream>
 
@@ -19,6 +20,8 @@ std::string format(const char* pattern, Values... values) {
 }
 
 std::string interval_text(const Bounded& figure, double unit = 1.0) {
+  if (!std::isfinite(figure.low) || !std::isfinite(figure.high))
+    return format("%10.5g  (interval not known)", figure.value * unit);
   return format("%10.5g  (%.5g to %.5g)", figure.value * unit, figure.low * unit,
                 figure.high * unit);
 }
@@ -86,7 +89,8 @@ void print_loop(std::ostream& stream, const std::string& title,
     if (figure)
       print_line(stream, name, figure->margin_db, figure->frequency_hz.value, figure->between_hz);
     else
-      stream << format("  %-22s", name) << "      none, the phase does not cross 180°\n";
+      stream << format("  %-22s      none, the phase does not cross 180° up to %.5g Hz\n", name,
+                       figures.searched_to_hz);
   };
   gain("gain margin, dB", figures.gain_margin);
   if (figures.gain_reduction) gain("gain reduction, dB", figures.gain_reduction);
@@ -98,7 +102,8 @@ void print_loop(std::ostream& stream, const std::string& title,
     print_line(stream, "delay margin, ms", delay.delay_s, delay.frequency_hz.value,
                delay.between_hz, 1e3);
   } else {
-    stream << format("  %-22s", "phase margin, deg") << "      none, the gain does not cross 1\n";
+    stream << format("  %-22s      none, the gain does not cross 1 up to %.5g Hz\n",
+                     "phase margin, deg", figures.searched_to_hz);
   }
   for (const identify::PhaseMargin& each : figures.gain_crossings)
     stream << format("  %-22s", "gain crossover, Hz") << interval_text(each.frequency_hz)

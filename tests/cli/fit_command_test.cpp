@@ -1,4 +1,5 @@
 // sinerig fit: what it refuses, and in which words; the keys of its JSON.
+#include <algorithm>
 #include <cmath>
 #include <complex>
 #include <cstdio>
@@ -226,6 +227,39 @@ TEST_F(FitCommand, RefusesOptionsThatMakeNoSense) {
   const auto absent = workshop_.sinerig("fit nowhere.csv");
   EXPECT_EQ(absent.exit_code, 2);
   EXPECT_THAT(absent.errors, HasSubstr("nowhere.csv: cannot be read"));
+}
+
+TEST_F(FitCommand, RefusesWhatTheMethodCannotKeepTo) {
+  const std::string orders = "--zeros 0 --poles 1 --method ";
+  for (const std::string method : {"hassul", "choe"})
+    for (const std::string option :
+         {"--stable", "--minimum-phase", "--given-pole -100", "--static-gain 3"})
+      refuses(lag_csv(), option.substr(0, option.find(' ')) + " belongs to --method ml",
+              orders + method + " " + option);
+  for (const std::string method : {"hassul", "ml"})
+    refuses(lag_csv(), "--bands belongs to --method choe", orders + method + " --bands 3");
+}
+
+// 1/(s (s/100 + 1)) is not one with two poles anywhere: left out, their place is chosen.
+TEST_F(FitCommand, ChoosesThePolesAtTheOriginBesideGivenOrders) {
+  std::string csv = "freq_hz,re,im,std\n";
+  for (int i = 0; i < 30; ++i) {
+    const double hz = std::pow(10.0, i / 14.5);
+    const std::complex<double> s{0.0, turn * hz};
+    const std::complex<double> H = 1.0 / (s * (s / 100.0 + 1.0));
+    char line[160];
+    std::snprintf(line, sizeof line, "%.17g,%.17g,%.17g,%.6g\n", hz, H.real(), H.imag(),
+                  1e-3 * std::abs(H));
+    csv += line;
+  }
+  const auto origin = [&](const std::string& arguments) {
+    const auto run = fit(csv, "--zeros 0 --poles 2 --json " + arguments);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    const json model = json::parse(run.output);
+    return std::count(model["poles"].begin(), model["poles"].end(), json::array({0.0, 0.0}));
+  };
+  EXPECT_EQ(origin(""), 1);
+  EXPECT_EQ(origin("--origin 0"), 0);
 }
 
 TEST_F(FitCommand, ChoeTakesTheSubBandsThatTheSweepPlanned) {

@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
+#include <sqlite3.h>
 
 #include "identify/biquad.h"
 #include "identify/discrete.h"
@@ -234,6 +235,68 @@ TEST_F(GimbalSweep, RefusesWhatCannotBeHad) {
   refuses("margins gimbal.sweep --controller-num 1,2", "belong together");
   refuses("margins gimbal.sweep --pid 1,2,3", "filter its derivative");
   refuses("margins gimbal.sweep --response loop --pid 1,2,3,40", "holds the controller already");
+}
+
+// What an interruption and `resume` leave: a fit of the points that there were then.
+TEST_F(GimbalSweep, FitsAgainWhatHasMorePointsThanItsFit) {
+  ASSERT_EQ(workshop_->shell("cp gimbal.sweep resumed.sweep").exit_code, 0);
+  const auto change = [](const char* sql) {
+    sqlite3* file = nullptr;
+    ASSERT_EQ(sqlite3_open((workshop_->folder() / "resumed.sweep").c_str(), &file), SQLITE_OK);
+    EXPECT_EQ(sqlite3_exec(file, sql, nullptr, nullptr, nullptr), SQLITE_OK);
+    sqlite3_close(file);
+  };
+  change("UPDATE point SET status = 'stopped' WHERE freq_hz > 60");
+  ASSERT_EQ(workshop_->sinerig("fit resumed.sweep").exit_code, 0);
+  const auto fresh = workshop_->sinerig("margins resumed.sweep" + pid_option);
+  EXPECT_THAT(fresh.errors, Not(HasSubstr("fitting it again")));
+  change("UPDATE point SET status = 'good'");
+  const auto resumed = workshop_->sinerig("margins resumed.sweep" + pid_option);
+  EXPECT_EQ(resumed.exit_code, 0) << resumed.errors;
+  EXPECT_THAT(resumed.errors, HasSubstr("made without; fitting it again"));
+  EXPECT_EQ(resumed.output, workshop_->sinerig("margins gimbal.sweep" + pid_option).output);
+  EXPECT_THAT(workshop_->sinerig("margins resumed.sweep").errors, Not(HasSubstr("fitting it")));
+}
+
+// 10 e^(−2 ms s)/(s/10π + 1) to 20 Hz: the phase crosses 180° at 128.1 Hz, far beyond.
+TEST(MarginsCommand, SearchesTheModelToWhereItsPhaseCrosses) {
+  const test::Workshop workshop;
+  std::string csv;
+  for (int i = 0; i < 40; ++i) {
+    const double hz = 0.1 * std::pow(200.0, i / 39.0);
+    const std::complex<double> s{0.0, turn * hz};
+    const std::complex<double> H = 10.0 / (s / (5.0 * turn) + 1.0) * std::exp(-2e-3 * s);
+    char line[160];
+    std::snprintf(line, sizeof line, "%.17g,%.17g,%.17g,%.6g\n", hz, H.real(), H.imag(),
+                  1e-3 * std::abs(H));
+    csv += line;
+  }
+  workshop.write("axis.csv", csv);
+  const auto model_of = [&](const std::string& gains) {
+    const auto run = workshop.sinerig("margins axis.csv --json --pid " + gains);
+    EXPECT_EQ(run.exit_code, 0) << run.errors;
+    return json::parse(run.output)["model"];
+  };
+  // atan(f/5 Hz) + 2π f · 2 ms = π, and |L| = 10/√(1 + (f/5 Hz)²) there.
+  const json one = model_of("1,0,0");
+  EXPECT_NEAR(one["gain_margin"]["margin_db"]["value"].get<double>(), 8.178, 0.01);
+  const json thirty = model_of("30,0,0");
+  EXPECT_FALSE(thirty["stable"].get<bool>());
+  EXPECT_LT(thirty["gain_margin"]["margin_db"]["value"].get<double>(), -20.0);
+  const auto points = workshop.sinerig("margins axis.csv --points-only --pid 1,0,0");
+  EXPECT_THAT(points.output, HasSubstr("does not cross 180° up to 20 Hz"));
+  EXPECT_THAT(workshop.sinerig("margins axis.csv --points-only --pid 30,0,0").output,
+              HasSubstr("does not cross 1 up to 20 Hz"));
+}
+
+TEST(MarginsCommand, TakesUnitsThatLookWrongWhenToldTo) {
+  const test::Workshop workshop;
+  workshop.write("bode.csv", "1,-3,-40\n2,-10,-80\n4,-20,-120\n8,-31,-150\n16,-43,-165\n");
+  for (const std::string command : {"margins bode.csv --points-only", "notch bode.csv"})
+    EXPECT_THAT(workshop.sinerig(command).errors, HasSubstr("say --trust-units"));
+  EXPECT_EQ(workshop.sinerig("margins bode.csv --points-only --trust-units").exit_code, 0);
+  EXPECT_THAT(workshop.sinerig("notch bode.csv --trust-units").errors,
+              Not(HasSubstr("say --trust-units")));
 }
 
 TEST(MarginsCommand, FitsFirstAndSaysSo) {

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 #include <random>
 #include <stdexcept>
@@ -40,6 +41,45 @@ TEST(LoopAnalysis, FindsTheMarginsOfATextbookLoop) {
   EXPECT_NEAR(figures.phase_margin->margin_deg.value,
               90.0 - 2.0 * std::atan(crossover) * 180.0 / pi, 1e-8);
   EXPECT_FALSE(figures.gain_reduction);
+}
+
+// −0.5/(s + 1): the closed loop has its pole at −0.5 and loses it to the right for twice the gain.
+TEST(LoopAnalysis, FindsTheGainMarginAtZeroFrequency) {
+  const LoopFigures figures = figures_of({{}, {-1.0}, -0.5, 0.0});
+  ASSERT_TRUE(figures.gain_margin);
+  EXPECT_NEAR(figures.gain_margin->margin_db.value, 20.0 * std::log10(2.0), 1e-9);
+  EXPECT_EQ(figures.gain_margin->frequency_hz.value, 0.0);
+  EXPECT_FALSE(figures_of({{}, {-1.0}, 0.5, 0.0}).gain_margin);
+  const LoopFigures unstable =
+      analyse_loop(LoopModel({{}, {-1.0}, -2.0, 0.0}, {}).curve(1e-2, 1e2, exact), false);
+  ASSERT_TRUE(unstable.gain_margin);
+  EXPECT_NEAR(unstable.gain_margin->margin_db.value, -20.0 * std::log10(2.0), 1e-9);
+}
+
+// K/s in ticks of T is KT/(z − 1): at half the rate −KT/2, and stable up to KT = 2.
+TEST(LoopAnalysis, FindsTheGainMarginAtHalfTheRate) {
+  const LoopModel loop({{}, {0.0}, 1.0, 0.0}, {{}, {}, 500.0, 0.0}, 1000.0);
+  const LoopFigures figures =
+      analyse_loop(loop.curve(1.0, loop.highest_rad_s(), exact), loop.closed_loop_stable());
+  ASSERT_TRUE(figures.gain_margin);
+  EXPECT_NEAR(figures.gain_margin->margin_db.value, 20.0 * std::log10(4.0), 1e-6);
+  EXPECT_NEAR(figures.gain_margin->frequency_hz.value, 500.0, 1e-9);
+  // Searched to less than that nothing is said of it, but how far the search went.
+  const LoopFigures below = analyse_loop(loop.curve(1.0, turn * 400.0, exact), true);
+  EXPECT_FALSE(below.gain_margin);
+  EXPECT_NEAR(below.searched_to_hz, 400.0, 1e-9);
+}
+
+// std::max(0.0, NaN) is 0.0, and a figure with that for its variance looks exactly known.
+TEST(LoopAnalysis, KeepsAScatterThatIsNotKnownApartFromNone) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const LoopModel loop({{}, {0.0, -1.0, -1.0}, 1.0, 0.0}, {});
+  const LoopFigures figures = analyse_loop(loop.curve(1e-2, 1e2, [none](double) {
+    return LogScatter{none, none, none};
+  }));
+  EXPECT_TRUE(std::isnan(figures.gain_margin->margin_db.high));
+  EXPECT_TRUE(std::isnan(figures.phase_margin->margin_deg.low));
+  EXPECT_TRUE(std::isnan(figures.sensitivity_peak.peak.high));
 }
 
 // 2 e^(−0.1 s)/s: phase margin 90° − 0.2 rad, delay margin that over 2 rad/s, gain margin π/0.4.

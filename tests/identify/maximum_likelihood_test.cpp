@@ -1,5 +1,6 @@
 #include "identify/maximum_likelihood.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -158,6 +159,42 @@ TEST(MaximumLikelihood, JudgesPointsByTheModelBehindItsHold) {
       }
     }
   }
+}
+
+// One order too many behind a hold: of what was measured, the response at the ticks, the fit knows
+// no less than the point does, whatever it says of the roots. (Of the response between the ticks it
+// may know less, and rightly so: of roots above half the rate the ticks see only an image.)
+TEST(MaximumLikelihood, KnowsTheResponseAtAPointAtLeastAsWellAsThePoint) {
+  const double period_s = 1e-3;
+  const auto grid = log_grid(2.0 * std::numbers::pi * 0.5, 2.0 * std::numbers::pi * 150.0, 40);
+  const ZerosPolesGain lag{{}, {-4.0 * std::numbers::pi}, 200.0 * std::numbers::pi, 2e-3};
+  int judged = 0;
+  for (const auto& [zeros, poles] : {std::pair{0, 1}, {0, 2}, {1, 2}, {1, 3}})
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      Random random(seed);
+      const Response response = noisy_behind_hold(lag, period_s, grid, 0.003, random);
+      FitOptions options;
+      options.zeros = zeros;
+      options.poles = poles;
+      options.delay = Delay::fit;
+      options.hold_period_s = period_s;
+      const Fit fit = fit_maximum_likelihood(response, options);
+      if (fit.condition > 1e5) continue;
+      ++judged;
+      for (const std::size_t i : {5U, 20U, 30U, 39U}) {
+        const ResponsePoint& point = response[i];
+        const auto held = [&](const ZerosPolesGain& model) {
+          const Complex H =
+              held_response(model, period_s, Eigen::ArrayXd::Constant(1, point.omega_rad_s))[0];
+          return std::vector<double>{H.real(), H.imag()};
+        };
+        const std::vector<double> error = standard_errors(fit.zpk, fit.root_covariance, held);
+        EXPECT_LE(error[0] * error[0] + error[1] * error[1],
+                  1.1 * (point.variance_re + point.variance_im))
+            << zeros << '/' << poles << " seed " << seed << " point " << i;
+      }
+    }
+  EXPECT_GT(judged, 8);
 }
 
 // Without scatter a search that ends short of the minimum leaves residuals that stand out; they are

@@ -110,5 +110,21 @@ TEST(Biquad, RoundsToFixedPoint) {
                std::invalid_argument);
 }
 
+// The −3 dB frequencies of the notch itself, found by bisection.
+TEST(NotchWidth, IsThatOfTheDiscreteNotchWhereItHasARate) {
+  for (const double rate_hz : {0.0, 5000.0, 500.0}) {
+    const Notch notch{100.0, 1e-6, 0.127, rate_hz};
+    const auto edge = [&](double inside, double outside) {
+      for (int i = 0; i < 60; ++i) {
+        const double middle = 0.5 * (inside + outside);
+        const bool deep = std::norm(notch.at(2.0 * std::numbers::pi * middle)) < 0.5;
+        (deep ? inside : outside) = middle;
+      }
+      return inside;
+    };
+    EXPECT_NEAR(notch.width_hz(), edge(100.0, 240.0) - edge(100.0, 1.0), 1e-3) << rate_hz;
+  }
+}
+
 }  // namespace
 }  // namespace sinerig::identify

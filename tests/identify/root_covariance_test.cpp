@@ -1,6 +1,7 @@
 #include "identify/root_covariance.h"
 
 #include <functional>
+#include <limits>
 #include <stdexcept>
 
 #include <gtest/gtest.h>
@@ -43,6 +44,27 @@ TEST(RootCovariance, GivesTheBandThatTheFitGives) {
     EXPECT_NEAR(through_roots.covariance, direct.covariance,
                 1e-5 * std::sqrt(direct.variance_re * direct.variance_im));
   }
+}
+
+// Two coordinates that cancel in the response but for less than the rounding of their variances.
+TEST(RootCovariance, SaysSoWhereTheBandIsBelowItsRounding) {
+  const ZerosPolesGain lag{{}, {-1.0}, 1.0, 0.0};
+  RootCovariance covariance{1.0, Eigen::MatrixXd::Zero(3, 3)};
+  EXPECT_EQ(response_with_covariance(lag, covariance, 0.5).variance_re, 0.0);
+  covariance.covariance(1, 1) = 1e-6;
+  const ResponsePoint known = response_with_covariance(lag, covariance, 0.5);
+  EXPECT_NEAR(known.variance_re + known.variance_im, 1e-6 * std::norm(known.response), 1e-18);
+  covariance.covariance(2, 2) = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_TRUE(std::isnan(response_with_covariance(lag, covariance, 0.5).variance_re));
+  // d ln G = −dp/(s − p)·… of the pole against a gain and a delay that undo it at one frequency.
+  const double omega = 0.5;
+  const std::complex<double> by_pole =
+      1.0 / std::complex<double>{1.0, omega} - (1.0 / std::complex<double>{1.0, 1.0}).real();
+  const Eigen::Vector3d undone =
+      1e8 * Eigen::Vector3d{1.0, -by_pole.real(), by_pole.imag() / omega};
+  covariance.covariance = undone * undone.transpose();
+  EXPECT_TRUE(std::isnan(response_with_covariance(lag, covariance, omega).variance_re));
+  EXPECT_FALSE(std::isnan(response_with_covariance(lag, covariance, 5.0).variance_re));
 }
 
 TEST(RootCovariance, CarriesTheErrorsOfCoefficientsOver) {

@@ -65,6 +65,20 @@ TEST(Compare, AToleranceForgivesSmallChanges) {
   EXPECT_FALSE(compare_responses(a, b, tolerant).changed());
 }
 
+// A tolerance for the gain alone: the phase differs by no more than it scatters.
+TEST(Compare, JudgesGainAndPhaseEachByItsOwnTolerance) {
+  std::mt19937_64 random{5};
+  const StoredResponse a = measured(random, 0.001);
+  const StoredResponse louder = measured(random, 0.001, 2.1);
+  EXPECT_TRUE(compare_responses(a, louder, {}).changed());
+  EXPECT_FALSE(compare_responses(a, louder, {.tolerance_db = 1.0}).changed());
+  EXPECT_TRUE(compare_responses(a, louder, {.tolerance_deg = 1.0}).changed());
+  StoredResponse later = a;
+  for (StoredPoint& point : later.points) point.response *= std::polar(1.0, 0.01);
+  EXPECT_FALSE(compare_responses(a, later, {.tolerance_deg = 1.0}).changed());
+  EXPECT_TRUE(compare_responses(a, later, {.tolerance_db = 1.0}).changed());
+}
+
 TEST(Compare, WithoutScatterOnlyTheTolerancesCount) {
   StoredResponse a = test::two_channel_run(10).responses[1];
   for (StoredPoint& point : a.points) point.dof = 0.0;
