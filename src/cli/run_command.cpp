@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <charconv>
 #include <filesystem>
 
@@ -31,8 +30,7 @@ int output_number(const fs::path& path, const std::string& stem) {
   if (name == stem) return 1;
   const char* const end = name.data() + name.size();
   int number = 0;
-  const auto read =
-      std::from_chars(name.data() + std::min(stem.size() + 1, name.size()), end, number);
+  const auto read = std::from_chars(name.data() + stem.size() + 1, end, number);
   return name[stem.size()] == '-' && read.ptr == end && number >= 2 ? number : 0;
 }
 

@@ -22,6 +22,9 @@ grep -q '^/dev/gpiochip0$' "$out/1" || fail "there is no GPIO chip: $(cat "$out/
 [ $? -eq 124 ] || fail "a command that does not end must give 124"
 grep -q 'stopped after 2 s' "$out/2" || fail "the reason for the stop is missing: $(cat "$out/2")"
 
+SINERIG_REQUIRE_BENCH='' "$bench" --systemd --root / true 2>"$out/2"
+[ $? -eq 125 ] && grep -q 'needs a --root of its own' "$out/2" || fail "systemd must not be started on this machine's root"
+
 "$bench" "$periodic_sleep" 20000 >"$out/first" || fail "the periodic program failed"
 "$bench" "$periodic_sleep" 20000 >"$out/second" || fail "the periodic program failed the second time"
 cmp "$out/first" "$out/second" || fail "two virtual-time runs of one program saw different times"
