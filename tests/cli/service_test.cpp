@@ -2,6 +2,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <future>
 #include <optional>
 #include <poll.h>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "cli/service_notifier.h"
 #include "record/database.h"
+#include "record/sweep_reader.h"
 #include "support/process.h"
 
 namespace sinerig {
@@ -172,6 +174,34 @@ TEST_F(Service, IsReadyWhereNothingIsLeftToMeasure) {
   EXPECT_EQ(resumed.code, 0) << resumed.err;
   EXPECT_THAT(resumed.err, HasSubstr("1 of 1 dwells are finished, 0 to go"));
   EXPECT_THAT(manager.all(), ElementsAre("READY=1", "STOPPING=1"));
+}
+
+// From the end of the loop on no tick feeds the watchdog, and the disk may take longer than that
+// waits.
+TEST_F(Service, IsStoppingWhileTheLastPointsWaitForTheDisk) {
+  write("rig.toml",
+        "[loop]\nrate_hz = 500\nclock = \"monotonic\"\n"
+        "[sweep]\nspacing = \"list\"\nfrequencies_hz = [1]\namplitude = 0.5\n"
+        "settling = \"fixed\"\nsettle_cycles = 1\nsettle_s = 0\nintegrate_cycles = 2\n"
+        "integrate_s = 0\ntarget_db = 0\ntarget_deg = 0\n"
+        "[limits]\n[actuator]\n[sensor.y]\n[output]\nmax_lag_s = 100\n"
+        "[plant]\nkind = \"transfer_function\"\nnum = [60]\nden = [1, 60]\n");
+  Manager manager{socket_};
+  const std::string command = "cd '" + folder_.string() + "' && NOTIFY_SOCKET='" + socket_ +
+                              "' SINERIG_FAULTY_DISK='hold=held' '" + FAULTY_SINERIG +
+                              "' run rig.toml --no-report --quiet 2>errors </dev/null";
+  std::future<int> ended =
+      std::async(std::launch::async, [&] { return std::system(command.c_str()); });
+  EXPECT_EQ(manager.next(patience_ms), "READY=1") << read("errors");
+  write("held", "");
+  std::string message;
+  do {
+    message = manager.next(patience_ms);
+  } while (!message.empty() && message != "STOPPING=1");
+  EXPECT_EQ(message, "STOPPING=1");
+  EXPECT_TRUE(record::read_sweep(path("rig.sweep")).responses.at(0).points.empty());
+  std::filesystem::remove(path("held"));
+  EXPECT_EQ(WEXITSTATUS(ended.get()), 0) << read("errors");
 }
 
 class NightService : public Service {

@@ -40,6 +40,7 @@ struct Disk {
   std::uint64_t kill_at = 0;   // 0: never
   std::uint64_t fails_at = 0;  // 0: never
   std::chrono::milliseconds sync_time{0};
+  std::string hold_file;
   bool power = false;
   bool limited = false;
   std::uint64_t room = 0;
@@ -171,6 +172,8 @@ int sync_file(sqlite3_file* base, int flags) {
   if (last) die();
   if (read_only()) return SQLITE_IOERR_FSYNC;
   std::this_thread::sleep_for(disk().sync_time);
+  while (!disk().hold_file.empty() && access(disk().hold_file.c_str(), F_OK) == 0)
+    std::this_thread::sleep_for(std::chrono::milliseconds{5});
   return file.real()->pMethods->xSync(file.real(), flags);
 }
 
@@ -284,6 +287,8 @@ void install_faulty_disk(const std::string& orders) {
       all.fails_at = std::stoull(value);
     } else if (name == "slow") {
       all.sync_time = std::chrono::milliseconds{std::stoll(value)};
+    } else if (name == "hold") {
+      all.hold_file = value;
     } else if (name == "power") {
       all.power = true;
     } else if (name == "full") {

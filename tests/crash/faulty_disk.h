@@ -15,6 +15,7 @@ namespace sinerig::test {
 //                that a run holds back (NAME-spare) counts once it is given back
 //   fails=N      from its N-th operation on the disk takes no write: it has become read-only
 //   slow=MS      every sync takes this long
+//   hold=FILE    no sync returns while there is such a file
 // Becomes the default VFS. Throws std::invalid_argument for anything else.
 void install_faulty_disk(const std::string& orders);
 
