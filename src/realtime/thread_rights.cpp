@@ -105,9 +105,10 @@ Grant follow(const Settings& loop) {
           .remedy = "set [loop] priority to 2 or more"};
 }
 
+// The flag stays: without CAP_SYS_NICE nobody gets rid of it, and asking to is refused.
 void leave() noexcept {
   const sched_param none{.sched_priority = 0};
-  sched_setscheduler(0, SCHED_OTHER, &none);
+  sched_setscheduler(0, SCHED_OTHER | SCHED_RESET_ON_FORK, &none);
 }
 
 }  // namespace sinerig::realtime
