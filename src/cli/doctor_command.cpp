@@ -48,14 +48,6 @@ bool any_missing(const std::vector<Finding>& findings) {
                      [](const Finding& each) { return !each.ok; });
 }
 
-// For what the two of setcap stand for.
-bool capabilities_would_help(const realtime::Grants& grants) {
-  return std::any_of(grants.begin(), grants.end(), [](const realtime::Grant& grant) {
-    return !grant.granted &&
-           (grant.right == realtime::Right::scheduling || grant.right == realtime::Right::memory);
-  });
-}
-
 void print_findings(const char* title, const std::vector<Finding>& findings) {
   std::cout << title << '\n';
   for (const Finding& each : findings) {
@@ -117,7 +109,7 @@ int doctor_command(const DoctorOptions& options) {
   if (!options.json) {
     const realtime::Starter starter = realtime::starter();
     print_findings(("rights, started by " + starter.name).c_str(), rights);
-    if (capabilities_would_help(thread.grants()))
+    if (realtime::capabilities_would_help(thread.grants()))
       std::cout << "  or for this program alone, whoever starts it: sudo setcap "
                    "cap_sys_nice,cap_ipc_lock=ep "
                 << realtime::program_path() << '\n';

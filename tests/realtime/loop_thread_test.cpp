@@ -226,6 +226,19 @@ TEST(Remedies, OfARefusedClassLeaveTheThrottlingOn) {
   EXPECT_THAT(allow_class(service, false), HasSubstr("RestrictRealtime=no"));
 }
 
+TEST(Capabilities, AreOfferedForWhatTheyGrant) {
+  const auto grants = [](Right missing) {
+    Grants all;
+    for (const Right right : {Right::scheduling, Right::memory, Right::heap, Right::idle_states})
+      all.push_back({.right = right, .granted = right != missing, .state = {}, .remedy = {}});
+    return all;
+  };
+  EXPECT_TRUE(capabilities_would_help(grants(Right::scheduling)));
+  EXPECT_TRUE(capabilities_would_help(grants(Right::memory)));
+  EXPECT_FALSE(capabilities_would_help(grants(Right::idle_states)));
+  EXPECT_FALSE(capabilities_would_help(grants(Right::cpu)));
+}
+
 TEST(Capabilities, CountOutsideOfUserNamespacesOnly) {
   EXPECT_TRUE(is_whole_machine("         0          0 4294967295\n"));
   EXPECT_FALSE(is_whole_machine("         0       1000          1\n"));
