@@ -10,6 +10,7 @@
 #include "config/rig.h"
 #include "drivers/driver.h"
 #include "sweep/clock.h"
+#include "sweep/waiting.h"
 
 namespace sinerig {
 
@@ -25,8 +26,12 @@ class Device {
  public:
   virtual ~Device() = default;
 
+  // Before open(): how it is to wait, outside of the loop.
+  void wait_as(const Waiting& waiting) { waiting_ = waiting; }
+
   // Acquires the hardware; throws std::runtime_error saying what failed and what to do. `clock`
-  // outlives the device. The destructor leaves the actuator neutral.
+  // outlives the device. The destructor leaves the actuator neutral. Where it waits, as arm() and
+  // rearm(), it throws StopRequested when told to stop.
   virtual void open(const Clock& clock) = 0;
 
   // Right before the first command: switches the device on. Throws like open(). A rig that is only
@@ -62,6 +67,12 @@ class Device {
   // Valid after open(). Null where the device has no actuator.
   virtual Actuator* actuator() noexcept = 0;
   virtual Sensor& sensor(std::size_t index) noexcept = 0;
+
+ protected:
+  const Waiting& waiting() const noexcept { return waiting_; }
+
+ private:
+  Waiting waiting_;
 };
 
 // What a driver is asked to serve: pointers into the rig, which outlives the call.

@@ -10,6 +10,7 @@
 #include "drivers/can/frame_pattern.h"
 #include "drivers/can/socket.h"
 #include "sweep/nonblocking.h"
+#include "sweep/waiting.h"
 
 namespace sinerig::can {
 
@@ -40,7 +41,9 @@ struct Slot {
 
 class Bus {
  public:
-  Bus(const std::string& interface, bool fd_frames) : socket_(interface, fd_frames) {}
+  // `waiting`: for the lists that are run over it.
+  Bus(const std::string& interface, bool fd_frames, const Waiting& waiting = {})
+      : socket_(interface, fd_frames), waiting_(waiting) {}
 
   // The index of the slot that will hold the newest frame of this kind.
   std::size_t listen(const Pattern& pattern, const Checksum& checksum = {});
@@ -76,6 +79,7 @@ class Bus {
   BusState state() const noexcept { return state_; }
   const BusCounters& counters() const noexcept { return counters_; }
   const std::string& interface() const noexcept { return socket_.interface(); }
+  const Waiting& waiting() const noexcept { return waiting_; }
 
  private:
   static constexpr int max_frames_per_poll = 512;
@@ -86,6 +90,7 @@ class Bus {
   void try_to_rebind() noexcept;
 
   Socket socket_;
+  Waiting waiting_;
   std::vector<Slot> slots_;
   BusState state_ = BusState::up;
   BusCounters counters_;

@@ -37,7 +37,7 @@ class CanActuator final : public Actuator {
   ~CanActuator() override;  // releases, then runs the shut-down list
 
   // After Bus::start(), before the loop. Both throw std::runtime_error where the device does not
-  // answer as it must; what was armed is disarmed again.
+  // answer as it must, StopRequested where a stop is; what was armed is disarmed again.
   void start();
   void arm();
 

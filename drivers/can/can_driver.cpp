@@ -62,7 +62,7 @@ class CanDevice final : public Device {
 
   void open(const Clock& /*clock*/) override {
     for (const Interface& interface : interfaces_)
-      buses_.push_back(std::make_unique<Bus>(interface.name, interface.fd));
+      buses_.push_back(std::make_unique<Bus>(interface.name, interface.fd, waiting()));
     if (command_) actuator_.emplace(*buses_[command_interface_], *command_);
     for (const Feedback& feedback : feedback_)
       sensors_.push_back(

@@ -1,5 +1,6 @@
 #include "drivers/can/sequence.h"
 
+#include <algorithm>
 #include <ctime>
 #include <sstream>
 #include <stdexcept>
@@ -10,7 +11,7 @@ namespace {
 constexpr std::int64_t retry_for_ns = 20'000'000;
 constexpr std::int64_t retry_pause_ns = 500'000;
 
-enum class Outcome : std::uint8_t { done, not_sent, no_answer, refused };
+enum class Outcome : std::uint8_t { done, not_sent, no_answer, refused, called_off };
 
 void pause_for(std::int64_t time_ns) noexcept {
   timespec left{time_ns / 1'000'000'000, time_ns % 1'000'000'000};
@@ -20,7 +21,8 @@ void pause_for(std::int64_t time_ns) noexcept {
 
 // The answer counts only if it comes after the frame: what lay in the socket before is taken in
 // first.
-Outcome run_once(Bus& bus, const Step& step, Patience& patience) noexcept {
+Outcome run_once(Bus& bus, const Step& step, const Waiting& waiting, Patience& patience) noexcept {
+  if (!waiting.may_go_on()) return Outcome::called_off;
   bus.drain();
   const bool expects = step.expect.has_value();
   const std::uint64_t answers = expects ? bus.slot(step.expect->slot).count : 0;
@@ -39,15 +41,17 @@ Outcome run_once(Bus& bus, const Step& step, Patience& patience) noexcept {
     if (bus.slot(step.expect->slot).count != answers) return Outcome::done;
     const std::int64_t left_ns = deadline_ns - monotonic_ns();
     if (left_ns <= 0) return Outcome::no_answer;
-    bus.wait_and_poll(left_ns);
+    if (!waiting.may_go_on()) return Outcome::called_off;
+    bus.wait_and_poll(std::min(left_ns, Waiting::turn_ns));
   }
 }
 
-Outcome run_step(Bus& bus, const Step& step, Patience& patience) noexcept {
+Outcome run_step(Bus& bus, const Step& step, const Waiting& waiting, Patience& patience) noexcept {
   Outcome outcome = Outcome::no_answer;
   for (std::uint32_t n = 0; n < step.repeats && outcome == Outcome::no_answer; ++n)
-    outcome = run_once(bus, step, patience);
-  if (step.delay_ns > 0) pause_for(step.delay_ns);
+    outcome = run_once(bus, step, waiting, patience);
+  if (outcome != Outcome::called_off && !waiting.pause_for(step.delay_ns))
+    return Outcome::called_off;
   return outcome;
 }
 
@@ -75,8 +79,9 @@ void listen_for(Bus& bus, Sequence& sequence) {
 void run(Bus& bus, const Sequence& sequence, const std::string& list_name) {
   Patience patience;
   for (const Step& step : sequence) {
-    const Outcome outcome = run_step(bus, step, patience);
+    const Outcome outcome = run_step(bus, step, bus.waiting(), patience);
     if (outcome == Outcome::done) continue;
+    if (outcome == Outcome::called_off) throw StopRequested{};
     std::ostringstream message;
     message << bus.interface() << ": " << list_name << " step '" << step.name << "' ";
     switch (outcome) {
@@ -98,7 +103,8 @@ void run(Bus& bus, const Sequence& sequence, const std::string& list_name) {
                 << static_cast<double>(step.expect->timeout_ns) * 1e-6
                 << " ms; is the device powered, and its node id and bit rate right?";
         break;
-      case Outcome::done: break;
+      case Outcome::done:
+      case Outcome::called_off: break;
     }
     throw std::runtime_error(message.str());
   }
@@ -107,7 +113,7 @@ void run(Bus& bus, const Sequence& sequence, const std::string& list_name) {
 int run_all(Bus& bus, const Sequence& sequence, Patience& patience) noexcept {
   int failed = 0;
   for (const Step& step : sequence)
-    if (run_step(bus, step, patience) != Outcome::done) ++failed;
+    if (run_step(bus, step, bus.waiting().to_the_end(), patience) != Outcome::done) ++failed;
   return failed;
 }
 

@@ -35,7 +35,8 @@ using Sequence = std::vector<Step>;
 // Has the bus listen for every expected answer. Before Bus::start().
 void listen_for(Bus& bus, Sequence& sequence);
 
-// Throws std::runtime_error at the first step that cannot be sent or is not answered as expected.
+// Throws std::runtime_error at the first step that cannot be sent or is not answered as expected,
+// StopRequested where a stop is: no further step is begun.
 void run(Bus& bus, const Sequence& sequence, const std::string& list_name);
 
 // How long several frames wait, together, for a bus that is dead to come back: longer than a

@@ -67,7 +67,7 @@ ModbusActuator::~ModbusActuator() {
   release();
   if (!started_) return;
   link_.idle([&](Transport& transport) {
-    if (transport.connected()) run_all(transport, settings_.shutdown);
+    if (transport.connected()) run_all(transport, settings_.shutdown, link_.waiting());
   });
 }
 
@@ -75,7 +75,9 @@ ModbusActuator::~ModbusActuator() {
 void ModbusActuator::start() {
   release();
   started_ = true;
-  link_.idle([&](Transport& transport) { run(transport, settings_.startup, "start-up"); });
+  link_.idle([&](Transport& transport) {
+    run(transport, settings_.startup, "start-up", link_.waiting());
+  });
 }
 
 // Neutral goes out before the drive is armed: one that finds a stale set-point would jump. A drive
@@ -86,7 +88,7 @@ void ModbusActuator::arm() {
     link_.idle([&](Transport& transport) {
       write_number(transport, settings_.place, settings_.neutral, link_.settings().writing,
                    monotonic_now_ns() + 500'000'000);
-      run(transport, settings_.arm, "arm");
+      run(transport, settings_.arm, "arm", link_.waiting());
     });
     require_pace(link_, link_.try_out(settings_.neutral, trial_exchanges));
   } catch (...) {

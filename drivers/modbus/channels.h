@@ -46,7 +46,8 @@ class ModbusActuator final : public Actuator {
   ~ModbusActuator() override;  // releases, then runs the shut-down list
 
   // After Link::open(), before the loop. Throw std::runtime_error where the device does not answer
-  // as it must, or not as often as the loop asks; what was armed is disarmed again.
+  // as it must, or not as often as the loop asks, StopRequested where a stop is; what was armed is
+  // disarmed again.
   void start();
   void arm();
 

@@ -23,8 +23,8 @@ Fault fault_of(Outcome outcome) noexcept {
 
 }  // namespace
 
-Link::Link(LinkSettings settings)
-    : settings_{std::move(settings)}, transport_{settings_.connection} {}
+Link::Link(LinkSettings settings, const Waiting& waiting)
+    : settings_{std::move(settings)}, waiting_{waiting}, transport_{settings_.connection} {}
 
 Link::~Link() {
   if (thread_.joinable()) {

@@ -36,7 +36,8 @@ struct LinkSettings {
 
 class Link {
  public:
-  explicit Link(LinkSettings settings);
+  // `waiting`: for what is done outside of the loop.
+  explicit Link(LinkSettings settings, const Waiting& waiting = {});
   ~Link();
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
@@ -45,7 +46,8 @@ class Link {
   std::size_t watch(const Place& place, std::string label);
   void command(const Place& place) { command_ = place; }
 
-  // Connects, reads everything once, starts the thread. Throws std::runtime_error.
+  // Connects, reads everything once, starts the thread. Throws std::runtime_error; StopRequested,
+  // as try_out(), where a stop is.
   void open();
 
   // Outside the loop, with the thread at rest.
@@ -92,6 +94,7 @@ class Link {
   void forget() noexcept;
 
   const LinkSettings& settings() const noexcept { return settings_; }
+  const Waiting& waiting() const noexcept { return waiting_; }
 
  private:
   struct Order {
@@ -114,6 +117,7 @@ class Link {
   static constexpr std::int64_t longest_pause_ns = 100'000'000;
 
   LinkSettings settings_;
+  Waiting waiting_;
   std::vector<Place> places_;
   std::vector<std::string> labels_;
   std::optional<Place> command_;

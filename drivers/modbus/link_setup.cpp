@@ -58,6 +58,7 @@ void Link::find_spare_registers() {
   spares_ = reading_plan_.questions;
   for (Request& question : spares_) {
     while (question.spare < most_spare) {
+      waiting_.go_on();
       Request longer = question;
       longer.spare = 0;
       longer.read_count = static_cast<std::uint16_t>(question.read_count + question.spare + 1);
@@ -79,6 +80,7 @@ void Link::open() {
     const ExchangePlan alone = ExchangePlan::make({places_[n]}, nullptr, settings_.writing, 0);
     Answer answer;
     for (int tries = 0; tries < opening_tries && transport_.connected(); ++tries) {
+      waiting_.go_on();
       const std::int64_t deadline_ns = monotonic_now_ns() + opening_ns;
       answer = transport_.ask(alone.questions.front(), deadline_ns, registers_);
       if (answer.outcome == Outcome::ok || answer.outcome == Outcome::exception) break;
@@ -127,6 +129,7 @@ Pace Link::try_out(std::optional<double> command, std::size_t exchanges) {
   std::size_t asked = 0;
   std::size_t failed = 0;
   while (asked < exchanges && failed < most_failures && transport_.connected()) {
+    waiting_.go_on();
     Exchange exchange;
     const Order order{.number = 0,
                       .handed_over_ns = monotonic_now_ns(),
@@ -190,7 +193,7 @@ Link::Released Link::release(double neutral, const Sequence& disarm) noexcept {
                                        monotonic_now_ns() + release_answer_ns);
     released.neutral = answer.outcome == Outcome::ok;
   }
-  released.disarmed = transport_.connected() && run_all(transport_, disarm);
+  released.disarmed = transport_.connected() && run_all(transport_, disarm, waiting_);
   return released;
 }
 

@@ -43,7 +43,7 @@ class ModbusDevice final : public Device {
 
   void open(const Clock& /*clock*/) override {
     for (const Connection& connection : connections_)
-      links_.push_back(std::make_unique<Link>(connection.link));
+      links_.push_back(std::make_unique<Link>(connection.link, waiting()));
     std::vector<bool> paced(links_.size(), false);
     for (const Feedback& feedback : feedback_) {
       sensors_.push_back(std::make_unique<ModbusSensor>(*links_[feedback.connection],

@@ -49,12 +49,9 @@ Answer write_surely(Transport& transport, const Step& step) noexcept {
   return answer;
 }
 
-void pause(std::int64_t delay_ns) noexcept {
-  if (delay_ns > 0) std::this_thread::sleep_for(std::chrono::nanoseconds{delay_ns});
-}
-
 // Empty when the step was done, else what went wrong.
-std::string perform(Transport& transport, const Step& step) {
+std::string perform(Transport& transport, const Step& step, const Waiting& waiting) {
+  waiting.go_on();
   if (step.write) {
     const Answer answer = write_surely(transport, step);
     if (answer.outcome != Outcome::ok) return transport.describe(answer);
@@ -74,10 +71,11 @@ std::string perform(Transport& transport, const Step& step) {
              << " s";
         return text.str();
       }
+      waiting.go_on();
       std::this_thread::sleep_for(between_readings);
     }
   }
-  pause(step.delay_ns);
+  if (!waiting.pause_for(step.delay_ns)) throw StopRequested{};
   return "";
 }
 
@@ -111,18 +109,19 @@ Answer write_number(Transport& transport, const Place& place, double value, Writ
   return transport.ask(request, deadline_ns, {});
 }
 
-void run(Transport& transport, const Sequence& sequence, const std::string& list) {
+void run(Transport& transport, const Sequence& sequence, const std::string& list,
+         const Waiting& waiting) {
   for (const Step& step : sequence) {
-    const std::string wrong = perform(transport, step);
+    const std::string wrong = perform(transport, step, waiting);
     if (!wrong.empty()) throw std::runtime_error(list + ", " + step.name + ": " + wrong);
   }
 }
 
-bool run_all(Transport& transport, const Sequence& sequence) noexcept {
+bool run_all(Transport& transport, const Sequence& sequence, const Waiting& waiting) noexcept {
   bool all = true;
   for (const Step& step : sequence) {
     if (step.write) all = write_surely(transport, step).outcome == Outcome::ok && all;
-    pause(step.delay_ns);
+    waiting.to_the_end().pause_for(step.delay_ns);
   }
   return all;
 }

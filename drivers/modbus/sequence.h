@@ -8,6 +8,7 @@
 
 #include "drivers/modbus/exchange.h"
 #include "drivers/modbus/transport.h"
+#include "sweep/waiting.h"
 
 namespace sinerig::modbus {
 
@@ -31,11 +32,13 @@ struct Step {
 };
 using Sequence = std::vector<Step>;
 
-// Throws std::runtime_error naming the list, the step and what the device said.
-void run(Transport& transport, const Sequence& sequence, const std::string& list);
+// Throws std::runtime_error naming the list, the step and what the device said; StopRequested where
+// a stop is: no further step is begun.
+void run(Transport& transport, const Sequence& sequence, const std::string& list,
+         const Waiting& waiting = {});
 
 // Every step whatever becomes of the others, for ways out. True when all was done.
-bool run_all(Transport& transport, const Sequence& sequence) noexcept;
+bool run_all(Transport& transport, const Sequence& sequence, const Waiting& waiting = {}) noexcept;
 
 // Writes one number; `deadline_ns` as Transport::ask.
 Answer write_number(Transport& transport, const Place& place, double value, Writing writing,

@@ -3,15 +3,14 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <vector>
 
 #include "drivers/driver.h"
 #include "sweep/clock.h"
 #include "sweep/guard.h"
+#include "sweep/run_control.h"
 
 namespace sinerig::cli {
 
@@ -45,9 +44,71 @@ struct RigCheck {
   std::vector<ChannelCheck> channels;  // one per sensor, in order
 };
 
-// Reads every sensor at every tick for `seconds` of the clock, or until `stop`. `guard` has one
-// channel per sensor.
-RigCheck check_channels(Clock& clock, std::span<Sensor* const> sensors, const GuardSettings& guard,
-                        double seconds, const std::atomic<bool>& stop);
+// Some of all values, evenly spread over them: each, until there is no more room; then every
+// second, every fourth …
+class ThinnedSeries {
+ public:
+  explicit ThinnedSeries(std::size_t room) { values_.reserve(room); }
+
+  void add(std::int64_t value) noexcept;
+  const std::vector<std::int64_t>& values() const noexcept { return values_; }
+  std::int64_t most() const noexcept { return most_; }  // of all
+  std::uint64_t count() const noexcept { return count_; }
+
+ private:
+  std::vector<std::int64_t> values_;
+  std::uint64_t count_ = 0;
+  std::uint64_t every_ = 1;
+  std::int64_t most_ = 0;
+};
+
+// How often which distance between two samples, to 1 % of it.
+class DistanceCounts {
+ public:
+  DistanceCounts() : counts_(bins) {}
+
+  void add(std::int64_t distance_ns) noexcept;
+
+  // How many samples are missing where `usual_ns` lie between two.
+  std::uint64_t missing(double usual_ns) const noexcept;
+
+ private:
+  static constexpr std::size_t bins = 4096;  // to 10^17 ns
+
+  std::vector<std::uint64_t> counts_;
+};
+
+// What the loop does for a check, and what is made of it afterwards: memory is taken beforehand and
+// does not grow, however long it takes.
+class ChannelCheckRun {
+ public:
+  // `guard` has one channel per sensor. `clock` and `sensors` must outlive it.
+  ChannelCheckRun(Clock& clock, std::span<Sensor* const> sensors, const GuardSettings& guard);
+
+  // In the loop: reads every sensor at every tick for `seconds` of the clock, or until a stop is
+  // requested.
+  void read(double seconds, const RunControl& control) noexcept;
+
+  RigCheck evaluate() const;
+
+ private:
+  struct Series {
+    Series();
+    void note(const Sample& sample, std::int64_t now_ns) noexcept;
+    ThinnedSeries ages_ns;
+    ThinnedSeries distances_ns;
+    DistanceCounts counts;
+    std::int64_t first_ns = 0;
+    std::int64_t last_ns = 0;
+  };
+  static void evaluate(const Series& series, ChannelCheck& check);
+
+  Clock& clock_;
+  std::vector<Sensor*> sensors_;
+  std::vector<Guard> guards_;
+  std::vector<Series> series_;
+  ThinnedSeries lateness_ns_;
+  RigCheck check_;
+};
 
 }  // namespace sinerig::cli

@@ -1,44 +1,15 @@
-#include <atomic>
-#include <csignal>
 #include <cstdio>
-#include <exception>
 #include <iostream>
 
 #include "cli/channel_check.h"
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
 #include "cli/real_time.h"
+#include "cli/stop_on_signal.h"
 
 namespace sinerig::cli {
 
 namespace {
-
-std::atomic<bool> stop_requested{false};
-
-void request_stop(int /*signal*/) {
-  stop_requested.store(true);
-}
-
-// The devices are closed in good order after Ctrl-C, too.
-class StopOnInterrupt {
- public:
-  StopOnInterrupt() {
-    struct sigaction action {};
-    action.sa_handler = request_stop;
-    sigaction(SIGINT, &action, &old_int_);
-    sigaction(SIGTERM, &action, &old_term_);
-  }
-  ~StopOnInterrupt() {
-    sigaction(SIGINT, &old_int_, nullptr);
-    sigaction(SIGTERM, &old_term_, nullptr);
-  }
-  StopOnInterrupt(const StopOnInterrupt&) = delete;
-  StopOnInterrupt& operator=(const StopOnInterrupt&) = delete;
-
- private:
-  struct sigaction old_int_ {};
-  struct sigaction old_term_ {};
-};
 
 template <class... Values>
 void print(const char* format, Values... values) {
@@ -98,20 +69,10 @@ std::vector<std::string> obstacles(const RigCheck& check, const config::Rig& rig
 
 // As a sweep would: with the rights that its loop has.
 RigCheck check_on(realtime::LoopThread& loop, ConfiguredRig& configured, double seconds) {
-  RigCheck check;
-  std::exception_ptr failure;
-  const auto look = [&] {
-    try {
-      check = check_channels(configured.clock(), configured.sensors(), configured.rig().guard,
-                             seconds, stop_requested);
-    } catch (...) {
-      failure = std::current_exception();
-    }
-  };
-  loop.start(look, {});
+  ChannelCheckRun check{configured.clock(), configured.sensors(), configured.rig().guard};
+  loop.start([&] { check.read(seconds, configured.control()); }, {});
   loop.join();
-  if (failure) std::rethrow_exception(failure);
-  return check;
+  return check.evaluate();
 }
 
 }  // namespace
@@ -119,9 +80,14 @@ RigCheck check_on(realtime::LoopThread& loop, ConfiguredRig& configured, double 
 int check_command(const CheckOptions& options, const std::vector<DriverKit>& drivers) {
   ConfiguredRig configured{options.rig, drivers};
   const config::Rig& rig = configured.rig();
-  const StopOnInterrupt stop_on_interrupt;
+  const StopOnSignal stop_on_signal{configured.control()};  // closes the devices in good order
   const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
-  configured.open();
+  try {
+    configured.open();
+  } catch (const StopRequested&) {
+    std::cout << "stop requested before anything was read\n";
+    return exit_interrupted;
+  }
   RigCheck check = check_on(*loop, configured, options.seconds);
   for (std::size_t i = 0; i < check.channels.size(); ++i)
     check.channels[i].answers_command = configured.answers_command(i);
@@ -140,7 +106,7 @@ int check_command(const CheckOptions& options, const std::vector<DriverKit>& dri
   const std::vector<std::string> found = obstacles(check, rig, remarks);
   if (found.empty()) {
     std::cout << "nothing was found that would stop a sweep\n";
-    return stop_requested.load() ? exit_interrupted : exit_done;
+    return configured.control().stop_requests.load() > 0 ? exit_interrupted : exit_done;
   }
   std::cout << "would stop a sweep:\n";
   for (const std::string& what : found) std::cout << "  " << what << '\n';

@@ -44,6 +44,7 @@ ConfiguredRig::ConfiguredRig(std::unique_ptr<config::RigFile> file,
     }
     if (!part.actuates && part.sensors.empty()) continue;
     part.device = driver.configure(request);
+    part.device->wait_as(Waiting{control_});
     parts_.push_back(std::move(part));
   }
   rig_.file->refuse_unread();
@@ -71,6 +72,7 @@ void ConfiguredRig::choose_responses() {
 void ConfiguredRig::open() {
   sensors_.resize(rig_.sensors.size());
   for (Part& part : parts_) {
+    Waiting{control_}.go_on();
     part.device->open(*clock_);
     if (part.actuates) actuator_ = part.device->actuator();
     for (std::size_t i = 0; i < part.sensors.size(); ++i) {
@@ -79,9 +81,25 @@ void ConfiguredRig::open() {
   }
 }
 
+// A stop that comes as the last of them is armed is a stop, too.
+template <class Switch>
+void ConfiguredRig::switch_on(Switch on) {
+  const Waiting waiting{control_};
+  try {
+    for (Part& part : parts_) {
+      waiting.go_on();
+      on(*part.device);
+    }
+    catch_up();
+    waiting.go_on();
+  } catch (...) {
+    actuator_->release();
+    throw;
+  }
+}
+
 void ConfiguredRig::arm() {
-  for (Part& part : parts_) part.device->arm();
-  catch_up();
+  switch_on([](Device& device) { device.arm(); });
 }
 
 void ConfiguredRig::catch_up() {
@@ -94,11 +112,9 @@ void ConfiguredRig::keep_released() noexcept {
 
 std::string ConfiguredRig::arm_again() {
   try {
-    for (Part& part : parts_) part.device->rearm();
-    catch_up();
+    switch_on([](Device& device) { device.rearm(); });
     return {};
   } catch (const std::exception& refused) {
-    actuator_->release();
     return refused.what();
   }
 }

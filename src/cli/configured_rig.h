@@ -9,6 +9,7 @@
 #include "drivers/device.h"
 #include "sweep/clock.h"
 #include "sweep/retry.h"
+#include "sweep/run_control.h"
 
 namespace sinerig::cli {
 
@@ -22,9 +23,13 @@ class ConfiguredRig final : public Rearm {
 
   const config::Rig& rig() const { return rig_; }
   Clock& clock() { return *clock_; }
+  // What stops the run, and whatever waits for a device.
+  RunControl& control() { return control_; }
 
-  // Acquires the hardware; the accessors below are valid from here on.
+  // Acquires the hardware; the accessors below are valid from here on. Throws StopRequested, as
+  // arm(), where a stop is.
   void open();
+  // Where it throws, nothing is armed any more.
   void arm();
   void catch_up();  // with what has come since: right before the loop
   std::string fault_reason() const override;
@@ -43,9 +48,12 @@ class ConfiguredRig final : public Rearm {
   };
 
   void choose_responses();
+  template <class Switch>
+  void switch_on(Switch on);
 
   config::Rig rig_;
   std::unique_ptr<Clock> clock_;  // outlives the devices
+  RunControl control_;            // likewise
   std::vector<Part> parts_;
   Actuator* actuator_ = nullptr;
   std::vector<Sensor*> sensors_;

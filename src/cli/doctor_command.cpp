@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <iostream>
@@ -108,7 +109,7 @@ int doctor_command(const DoctorOptions& options) {
   if (!options.json) {
     const realtime::Starter starter = realtime::starter();
     print_findings(("rights, started by " + starter.name).c_str(), rights);
-    if (any_missing(rights))
+    if (realtime::capabilities_would_help(thread.grants()))
       std::cout << "  or for this program alone, whoever starts it: sudo setcap "
                    "cap_sys_nice,cap_ipc_lock=ep "
                 << realtime::program_path() << '\n';

@@ -62,7 +62,8 @@ LiveView::LiveView(const std::string& address, const config::Rig& rig, const Swe
 }
 
 void LiveView::finish(const RunEnd& end) {
-  std::vector<std::string> files{end.sweep_file};
+  std::vector<std::string> files;
+  if (!end.sweep_file.empty()) files.push_back(end.sweep_file);
   if (!end.report_file.empty()) files.push_back(end.report_file);
   run_.finish({.outcome = end.outcome, .detail = end.reason, .files = files});
 }

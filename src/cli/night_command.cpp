@@ -25,6 +25,9 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
+// Of the sweeps of a night, at its end.
+constexpr std::chrono::minutes most_reading{10};
+
 std::unique_ptr<ConfiguredRig> configured_rig(const NightTask& task,
                                               const std::vector<DriverKit>& drivers) {
   return std::make_unique<ConfiguredRig>(config::RigFile::parse(task.rig_text, task.sweep->rig),
@@ -140,6 +143,7 @@ int Night::attend(const NightTask& task, std::size_t number, const NightFolder& 
   if (between_.stop_requests.load() > 0) return exit_interrupted;
   tell(task, state, number);
   const int ended = sweep(task, state);
+  if (!fs::exists(task.sweep_file)) return ended;  // told to stop before it began
   const record::StoredRun run = record::read_sweep(task.sweep_file);
   std::uint64_t ticks = 0;
   for (const record::StoredTiming& timing : run.timings) ticks += timing.ticks + timing.skipped;
@@ -171,7 +175,8 @@ int Night::run() {
 
 int Night::conclude(const NightFolder& folder, int code) {
   service_.stopping();
-  std::vector<report::NightRow> rows = night_rows(job_, tasks_);
+  std::vector<report::NightRow> rows =
+      attended(service_, for_at_most(most_reading), [&] { return night_rows(job_, tasks_); });
   bool changed = false;
   for (report::NightRow& row : rows) {
     changed = changed || row.changed();

@@ -31,6 +31,9 @@ constexpr std::size_t outbox_backlog = 1U << 14U;
 
 constexpr std::chrono::milliseconds progress_interval{50};
 
+// Beside the loop: a prior fitted, a file made, a report written. A large one takes a minute.
+constexpr std::chrono::minutes most_desk_work{10};
+
 // Points on their way from the recorder's thread to the one that prints.
 class PointInbox {
  public:
@@ -57,7 +60,8 @@ struct Audience {
   std::function<void()> at_rest;  // the loop has ended, its last points are still to be written
   LiveView* view;
   record::Recorder::Samples samples;
-  double tick_s;  // of a loop in real time; 0 in virtual time
+  double tick_s;                                // of a loop in real time; 0 in virtual time
+  std::chrono::duration<double> disk_patience;  // [output] max_lag_s
 };
 
 struct Played {
@@ -95,12 +99,13 @@ Played play(const SweepPlan& plan, realtime::LoopThread& loop, SweepRunner& runn
   };
   record::Recorder recorder{outbox, writer, observe, audience.samples, audience.tick_s};
   Played played;
-  std::atomic<bool> done{false};
-  loop.start([&] { played.outcome = runner.run(control); },
-             [&] {
-               outbox.close();
-               done.store(true);
-             });
+  std::atomic<bool> ended{false};
+  loop.start(
+      [&] {
+        played.outcome = runner.run(control);
+        ended.store(true);
+      },
+      [&] { outbox.close(); });
   const EndOfLoop end_of_loop{loop, control};
   const auto tell = [&] {
     for (const Point& point : inbox.take()) audience.teller.point(point);
@@ -109,20 +114,25 @@ Played play(const SweepPlan& plan, realtime::LoopThread& loop, SweepRunner& runn
   const auto tell_service = [&] {
     const std::uint32_t dwell = control.dwell.load();
     const std::uint64_t tick = control.tick.load();
-    audience.service.progress(tick, std::chrono::steady_clock::now());
+    audience.service.progress(control.progress(), std::chrono::steady_clock::now());
     time.update(dwell, tick);
     audience.service.status(status_text(plan, dwell, time));
   };
-  while (!done.load()) {
+  while (!ended.load()) {
     tell();
     tell_service();
     std::this_thread::sleep_for(progress_interval);
   }
-  loop.join();
   tell_service();
   audience.at_rest();
+  // Neutral, and no tick any more: the disk has the time that the rig gives it, and a little.
+  const auto patience =
+      std::chrono::duration_cast<std::chrono::nanoseconds>(audience.disk_patience);
   try {
-    recorder.finish();
+    attended(audience.service, for_at_most(patience + most_desk_work), [&] {
+      loop.join();
+      recorder.finish();
+    });
   } catch (const record::SweepFileError& error) {
     played.disk_failure = error.what();
   }
@@ -161,7 +171,7 @@ std::string reason_of(const Played& played, const Outbox& outbox, const Configur
   const bool by_device =
       trip.cause == TripCause::actuator_fault || trip.cause == TripCause::channel_age;
   if (by_device && !configured.fault_reason().empty()) reason += ": " + configured.fault_reason();
-  if (played.outcome.faults > 0) {
+  if (played.outcome.faults > 0 && trip.device_fault()) {
     reason +=
         " (" + std::to_string(played.outcome.faults) + " tries to arm again are spent, [retry])";
   }
@@ -173,6 +183,18 @@ std::string reason_of(const Played& played, const Outbox& outbox, const Configur
                                : ": the queue in front of it is full";
   }
   return reason;
+}
+
+// In a handler: of a run that was asked to stop before its loop.
+std::string reason_not_to_begin() {
+  const std::string reason = "stop requested before the sweep began";
+  try {
+    throw;
+  } catch (const StopRequested&) {
+    return reason;
+  } catch (const std::exception& failure) {
+    return reason + ": " + failure.what();
+  }
 }
 
 // Once more after making room. Says what the disk said where that failed, too.
@@ -235,12 +257,21 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
                const OpenSweepFile& open_file, const record::UnfinishedRun* earlier) {
   const config::Rig& rig = configured.rig();
   Clock& clock = configured.clock();
-  const std::optional<KnownModes> modes = earlier_modes(rig);
-  const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
-  RunControl control;
+  RunControl& control = configured.control();
   const StopOnSignal stop_on_signal{control};
   std::optional<ServiceNotifier> own_service;
   ServiceNotifier& service = options.service != nullptr ? *options.service : own_service.emplace();
+  // From the end of the loop on no tick feeds the watchdog, and a slow disk may take its time.
+  const auto at_rest = [&] {
+    service.ready();  // where nothing was left to measure: an end before that counts as a failure
+    own_service ? service.stopping() : service.idle(std::chrono::steady_clock::now());
+  };
+  const SignOfLife waiting = [&] {
+    return control.progress();
+  };
+  const std::optional<KnownModes> modes =
+      attended(service, for_at_most(most_desk_work), [&] { return earlier_modes(rig); });
+  const std::unique_ptr<realtime::LoopThread> loop = make_loop_thread(rig);
   RunTeller teller{options.voice, options.table, rig, plan};
   const std::unique_ptr<LiveView> view =
       options.serve ? std::make_unique<LiveView>(*options.serve, rig, plan, clock, control)
@@ -263,7 +294,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
   std::unique_ptr<SweepRunner> runner;
   bool to_measure = true;
   try {
-    configured.open();
+    attended(service, waiting, [&] { configured.open(); });
     runner = std::make_unique<SweepRunner>(plan, settings, view ? view->clock() : clock,
                                            configured.actuator(), configured.sensors(), guard,
                                            outbox, &configured);
@@ -273,7 +304,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
       teller.resume(earlier->finished.points);
       if (view) view->run().resume(earlier->finished);
     }
-    if (to_measure) configured.arm();
+    if (to_measure) attended(service, waiting, [&] { configured.arm(); });
     writer->begin_part(earlier != nullptr ? earlier->start : record::PartStart{});
     if (earlier != nullptr && !modes && without_review(plan, *runner, earlier->finished)) {
       writer->write(Event{.kind = EventKind::model_doubted,
@@ -288,13 +319,13 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
     if (to_measure) configured.catch_up();
   } catch (...) {
     writer->discard();
-    throw;
+    if (control.stop_requests.load() == 0) throw;
+    const RunEnd end{.outcome = "interrupted", .reason = reason_not_to_begin(), .sweep_file = ""};
+    at_rest();
+    if (view) view->finish(end);
+    teller.end(end);
+    return exit_interrupted;
   }
-  // No tick feeds the watchdog any more, and a slow disk may take its time.
-  const auto at_rest = [&] {
-    service.ready();  // where nothing was left to measure: an end before that counts as a failure
-    own_service ? service.stopping() : service.idle(std::chrono::steady_clock::now());
-  };
   Played played;
   if (to_measure) {
     const bool keep_samples = rig.runner.record_samples || !view;
@@ -305,7 +336,8 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
                    .view = view.get(),
                    .samples = keep_samples ? record::Recorder::Samples::written
                                            : record::Recorder::Samples::watched,
-                   .tick_s = in_real_time ? clock.grid().period_s() : 0.0});
+                   .tick_s = in_real_time ? clock.grid().period_s() : 0.0,
+                   .disk_patience = std::chrono::duration<double>{rig.max_lag_s}});
   } else {
     at_rest();
   }
@@ -314,11 +346,13 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
              .reason = reason_of(played, outbox, configured),
              .sweep_file = writer->path(),
              .dropped_samples = rig.runner.record_samples ? outbox.dropped_samples() : 0};
-  if (const std::string unsaid = put_down_end(*writer, end); !unsaid.empty()) {
-    end.outcome = "stopped";
-    end.reason += (end.reason.empty() ? "" : "; not in the file, ") + unsaid;
-  }
-  if (options.report) end.report_file = report_beside(writer->path());
+  attended(service, for_at_most(most_desk_work), [&] {
+    if (const std::string unsaid = put_down_end(*writer, end); !unsaid.empty()) {
+      end.outcome = "stopped";
+      end.reason += (end.reason.empty() ? "" : "; not in the file, ") + unsaid;
+    }
+    if (options.report) end.report_file = report_beside(writer->path());
+  });
   if (view) view->finish(end);
   teller.end(end);
   return exit_code(end.outcome);

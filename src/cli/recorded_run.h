@@ -30,9 +30,10 @@ record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan);
 using OpenSweepFile = std::function<std::unique_ptr<record::SweepWriter>()>;
 
 // Runs the plan, or what `earlier` has left of it, and returns the exit code. Signals are stop
-// requests meanwhile. Throws where the rig or the file cannot be had: a file that was created for
-// this is gone then, an earlier one as it was. Whatever fails later ends the run: actuator
-// released, reason in the file where the disk takes it, exit code 3.
+// requests meanwhile; one that comes before the loop begins leaves no file, and an earlier one as
+// it was. Throws where the rig or the file cannot be had: a file that was created for this is gone
+// then, an earlier one as it was. Whatever fails later ends the run: actuator released, reason in
+// the file where the disk takes it, exit code 3.
 int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedRunOptions& options,
                const OpenSweepFile& open_file, const record::UnfinishedRun* earlier = nullptr);
 

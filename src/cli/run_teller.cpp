@@ -124,7 +124,7 @@ void RunTeller::end(const RunEnd& end) {
 }
 
 void RunTeller::end_in_words(const RunEnd& end) {
-  if (voice_ == Voice::text && table_)
+  if (voice_ == Voice::text && table_ && !end.sweep_file.empty())
     report::print_run(std::cout, record::read_sweep(end.sweep_file));
   std::cout.flush();  // before the messages on standard error
   if (!end.reason.empty()) spdlog::error("{}", end.reason);
@@ -132,13 +132,14 @@ void RunTeller::end_in_words(const RunEnd& end) {
     spdlog::warn("{} samples were dropped: the disk is too slow for [output] samples",
                  end.dropped_samples);
   }
-  spdlog::info("wrote {}", end.sweep_file);
+  if (!end.sweep_file.empty()) spdlog::info("wrote {}", end.sweep_file);
   if (!end.report_file.empty())
     spdlog::info("wrote {}, the report: open it in a browser", end.report_file);
 }
 
 void RunTeller::end_as_json(const RunEnd& end) {
-  const record::StoredRun run = record::read_sweep(end.sweep_file);
+  const record::StoredRun run =
+      end.sweep_file.empty() ? record::StoredRun{} : record::read_sweep(end.sweep_file);
   std::uint64_t skipped = 0;
   std::int64_t latest_ns = 0;
   for (const record::StoredTiming& timing : run.timings) {
@@ -161,7 +162,7 @@ void RunTeller::end_as_json(const RunEnd& end) {
             {"skipped_ticks", skipped},
             {"max_lateness_us", static_cast<double>(latest_ns) * 1e-3},
             {"dropped_samples", end.dropped_samples},
-            {"sweep", end.sweep_file}};
+            {"sweep", end.sweep_file.empty() ? Json{} : Json(end.sweep_file)}};
   line["report"] = end.report_file.empty() ? Json{} : Json(end.report_file);
   print_line(line);
 }

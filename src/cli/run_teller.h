@@ -11,9 +11,9 @@
 namespace sinerig::cli {
 
 struct RunEnd {
-  std::string outcome;  // done, interrupted, stopped
-  std::string reason;   // in words; empty when done
-  std::string sweep_file;
+  std::string outcome;        // done, interrupted, stopped
+  std::string reason;         // in words; empty when done
+  std::string sweep_file;     // empty: it ended before it began
   std::string report_file{};  // empty: none
   std::uint64_t dropped_samples = 0;
 };

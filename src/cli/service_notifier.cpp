@@ -1,5 +1,6 @@
 #include "cli/service_notifier.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
@@ -15,6 +16,11 @@
 namespace sinerig::cli {
 
 namespace {
+
+// Asked for again long before it is over.
+constexpr std::chrono::microseconds more_time = std::chrono::seconds{60};
+
+constexpr std::chrono::milliseconds turn_of_attendant{50};
 
 std::string variable(const char* name) {
   const char* value = std::getenv(name);
@@ -66,22 +72,58 @@ void ServiceNotifier::status(const std::string& text) {
   send("STATUS=" + text);
 }
 
-void ServiceNotifier::progress(std::uint64_t tick, Time now) {
-  if (watchdog_.count() <= 0 || tick == fed_at_ || now < next_) return;
-  fed_at_ = tick;
-  next_ = now + watchdog_ / 4;
-  send("WATCHDOG=1");
+void ServiceNotifier::progress(std::uint64_t progress, Time now) {
+  if (progress == fed_at_ || now < next_) return;
+  fed_at_ = progress;
+  feed(now);
 }
 
 void ServiceNotifier::idle(Time now) {
   fed_at_ = UINT64_MAX;  // the ticks of the next loop begin anew
-  if (watchdog_.count() <= 0 || now < next_) return;
-  next_ = now + watchdog_ / 4;
-  send("WATCHDOG=1");
+  if (now >= next_) feed(now);
+}
+
+void ServiceNotifier::feed(Time now) {
+  const bool watched = watchdog_.count() > 0;
+  const bool counted = !ready_ || stopping_;
+  std::string meal;
+  if (watched) meal.append("WATCHDOG=1");
+  if (watched && counted) meal.append("\n");
+  if (counted) meal.append("EXTEND_TIMEOUT_USEC=").append(std::to_string(more_time.count()));
+  next_ = now + (watched ? std::min(watchdog_, more_time) : more_time) / 4;
+  if (!meal.empty()) send(meal);
 }
 
 void ServiceNotifier::stopping() {
+  stopping_ = true;
   send(watchdog_.count() > 0 ? "STOPPING=1\nWATCHDOG=1" : "STOPPING=1");
+}
+
+SignOfLife for_at_most(std::chrono::nanoseconds limit) {
+  const auto end = std::chrono::steady_clock::now() + limit;
+  return [end, turns = std::uint64_t{0}]() mutable {
+    if (std::chrono::steady_clock::now() < end) ++turns;
+    return turns;
+  };
+}
+
+Attendant::Attendant(ServiceNotifier& service, SignOfLife life) {
+  if (!service.heard()) return;
+  thread_ = std::thread{[this, &service, life = std::move(life)] {
+    std::unique_lock lock{mutex_};
+    while (!changed_.wait_for(lock, turn_of_attendant, [this] { return done_; }))
+      service.progress(life(), std::chrono::steady_clock::now());
+  }};
+}
+
+Attendant::~Attendant() {
+  if (!thread_.joinable()) return;
+  {
+    const std::scoped_lock lock{mutex_};
+    done_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
 }
 
 std::string status_text(const SweepPlan& plan, std::uint32_t dwell,

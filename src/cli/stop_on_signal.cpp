@@ -17,9 +17,10 @@ void raise_to(std::atomic<int>& count, int least) {
 
 }  // namespace
 
-void StopOnSignal::count_stop_request(int /*signal*/) {
+void StopOnSignal::count_stop_request(int signal) {
+  const int requests = signal == SIGQUIT ? 2 : 1;
   for (const StopOnSignal* each = innermost.load(); each != nullptr; each = each->outer_) {
-    each->control_.stop_requests.fetch_add(1);
+    each->control_.stop_requests.fetch_add(requests);
   }
 }
 
@@ -27,21 +28,27 @@ StopOnSignal::StopOnSignal(RunControl& control) : control_{control}, outer_{inne
   innermost = this;
   struct sigaction action {};
   action.sa_handler = count_stop_request;
-  sigaction(SIGINT, &action, &old_int_);
-  sigaction(SIGTERM, &action, &old_term_);
-  sigaction(SIGHUP, &action, &old_hup_);
+  for (std::size_t i = 0; i < stopping.size(); ++i) {
+    sigaction(stopping[i], nullptr, &old_stopping_[i]);
+    const bool unheard = old_stopping_[i].sa_handler == SIG_IGN && stopping[i] != SIGTERM;
+    if (!unheard) sigaction(stopping[i], &action, nullptr);
+  }
   action.sa_handler = SIG_IGN;
-  sigaction(SIGPIPE, &action, &old_pipe_);
+  for (std::size_t i = 0; i < ignored.size(); ++i) {
+    sigaction(ignored[i], &action, &old_ignored_[i]);
+  }
   if (outer_ != nullptr) {
     raise_to(control.stop_requests, outer_->control_.stop_requests.load());
   }
 }
 
 StopOnSignal::~StopOnSignal() {
-  sigaction(SIGINT, &old_int_, nullptr);
-  sigaction(SIGTERM, &old_term_, nullptr);
-  sigaction(SIGHUP, &old_hup_, nullptr);
-  sigaction(SIGPIPE, &old_pipe_, nullptr);
+  for (std::size_t i = 0; i < stopping.size(); ++i) {
+    sigaction(stopping[i], &old_stopping_[i], nullptr);
+  }
+  for (std::size_t i = 0; i < ignored.size(); ++i) {
+    sigaction(ignored[i], &old_ignored_[i], nullptr);
+  }
   innermost = outer_;
 }
 

@@ -22,26 +22,28 @@ std::string line_of(const fs::path& path) {
   return line;
 }
 
+bool has_word(const std::string& text, const std::string& wanted) {
+  std::istringstream words{text};
+  for (std::string word; words >> word;)
+    if (word == wanted) return true;
+  return false;
+}
+
 class Examination {
  public:
   Examination(const Settings& settings, const std::string& root)
       : settings_{settings}, cpus_{root + "/sys/devices/system/cpu"}, root_{root} {}
 
   Finding kernel() const {
-    Finding found{.name = "kernel",
-                  .ok = line_of(root_ + "/sys/kernel/realtime") == "1",
-                  .state = {},
-                  .remedy = {}};
+    Finding found{.name = "kernel", .ok = false, .state = {}, .remedy = {}};
+    // The patches' kernels have the first, those since 6.12 the second: "#1 SMP PREEMPT_RT …".
+    found.ok = line_of(root_ + "/sys/kernel/realtime") == "1" ||
+               has_word(line_of(root_ + "/proc/sys/kernel/version"), "PREEMPT_RT");
     utsname host{};
     uname(&host);
     const std::string release = host.release;
     found.state = release + (found.ok ? ", PREEMPT_RT" : ", not PREEMPT_RT");
-    const std::string machine = host.machine;
-    const std::string architecture = machine == "x86_64"    ? "amd64"
-                                     : machine == "aarch64" ? "arm64"
-                                                            : machine;
-    if (!found.ok)
-      found.remedy = "sudo apt install linux-image-rt-" + architecture + ", then boot it";
+    if (!found.ok) found.remedy = realtime_kernel(host.machine);
     return found;
   }
 
@@ -54,6 +56,12 @@ class Examination {
     found.ok = settings_.cpu ? std::find(apart.begin(), apart.end(), *settings_.cpu) != apart.end()
                              : !apart.empty();
     const std::string which = settings_.cpu ? "CPU " + std::to_string(*settings_.cpu) : "no CPU";
+    if (found.ok && !settings_.cpu) {
+      found.ok = false;
+      found.state = "CPU " + text + " is " + meaning + ", but [loop] cpu names none";
+      found.remedy = "set [loop] cpu = " + std::to_string(apart.front());
+      return found;
+    }
     if (found.ok) {
       found.state = "CPU " + text + " " + meaning;
       return found;
@@ -157,6 +165,14 @@ class Examination {
 };
 
 }  // namespace
+
+std::string realtime_kernel(const std::string& machine) {
+  const char* const architecture = machine == "x86_64"    ? "amd64"
+                                   : machine == "aarch64" ? "arm64"
+                                                          : nullptr;
+  if (architecture == nullptr) return "boot a kernel that is built with CONFIG_PREEMPT_RT";
+  return std::string{"sudo apt install linux-image-rt-"} + architecture + ", then boot it";
+}
 
 std::vector<int> cpu_list(const std::string& text) {
   std::vector<int> cpus;

@@ -20,6 +20,9 @@ struct Finding {
 // the files of /proc and /sys under `root`; what is not there is said so.
 std::vector<Finding> examine_machine(const Settings& settings, const std::string& root = "");
 
+// How to get a kernel with PREEMPT_RT for the `machine` of uname(2).
+std::string realtime_kernel(const std::string& machine);
+
 // "0-2,5" → 0, 1, 2, 5; what is no number is left out.
 std::vector<int> cpu_list(const std::string& text);
 

@@ -5,13 +5,13 @@
 #include <cstdlib>
 #include <cstring>
 #include <fcntl.h>
+#include <filesystem>
 #include <malloc.h>
 #include <unistd.h>
 
 #include <linux/capability.h>
 #include <sys/mman.h>
-
-#include "realtime/remedies.h"
+#include <system_error>
 
 namespace sinerig::realtime {
 
@@ -95,9 +95,20 @@ Grant ProcessRights::hold_latency() {
     return grant;
   }
   const int error = errno;
+  std::error_code ignored;
+  return without_latency_file(error, starter(),
+                              std::filesystem::exists("/sys/devices/system/cpu/cpuidle", ignored));
+}
+
+Grant without_latency_file(int error, const Starter& starter, bool idles) {
+  Grant grant{.right = Right::idle_states, .state = {}, .remedy = {}};
+  if (error == ENOENT && !idles) {
+    grant.granted = true;
+    grant.state = "there are no idle states that this kernel could choose";
+    return grant;
+  }
   grant.state = std::string{latency_path} + " cannot be written: " + std::strerror(error);
-  grant.remedy =
-      error == ENOENT ? "use a kernel with CONFIG_CPU_IDLE" : allow_cpu_latency(starter());
+  grant.remedy = error == ENOENT ? show_cpu_latency(starter) : allow_cpu_latency(starter);
   return grant;
 }
 

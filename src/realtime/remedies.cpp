@@ -2,7 +2,9 @@
 
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <pwd.h>
+#include <sstream>
 #include <unistd.h>
 
 #include <linux/capability.h>
@@ -25,9 +27,15 @@ std::string unit_of_this_process() {
   return {};
 }
 
+std::string uid_map() {
+  std::ifstream file{"/proc/self/uid_map"};
+  return {std::istreambuf_iterator<char>{file}, {}};
+}
+
 std::string user_name() {
-  const passwd* entry = getpwuid(geteuid());
-  return entry == nullptr ? std::to_string(geteuid()) : entry->pw_name;
+  const uid_t user = outside_id(uid_map(), geteuid());
+  const passwd* entry = getpwuid(user);
+  return entry == nullptr ? std::to_string(user) : entry->pw_name;
 }
 
 std::string limit(const Starter& starter, const char* item, const char* value) {
@@ -82,13 +90,56 @@ std::string allow_cpu_latency(const Starter& starter) {
   return {};
 }
 
+std::string allow_class(const Starter& starter, bool budgets) {
+  if (budgets) return "sudo sysctl -w kernel.sched_rt_runtime_us=-1";
+  switch (starter.kind) {
+    case Starter::Kind::service: return unit_line(starter, "RestrictRealtime=no");
+    case Starter::Kind::container:
+      return "start the container with --cap-add SYS_NICE and a seccomp profile that has "
+             "sched_setscheduler";
+    case Starter::Kind::person: return "boot a kernel without CONFIG_RT_GROUP_SCHED";
+  }
+  return {};
+}
+
+std::string show_cpu_latency(const Starter& starter) {
+  switch (starter.kind) {
+    case Starter::Kind::service: return unit_line(starter, "PrivateDevices=no");
+    case Starter::Kind::container: return allow_cpu_latency(starter);
+    case Starter::Kind::person: return "use a kernel with CONFIG_CPU_IDLE";
+  }
+  return {};
+}
+
 std::string program_path() {
   std::error_code ignored;
   const fs::path path = fs::read_symlink("/proc/self/exe", ignored);
   return path.empty() ? "sinerig" : path.string();
 }
 
+// Lines of "inside outside count".
+bool is_whole_machine(const std::string& uid_map) {
+  std::istringstream lines{uid_map};
+  std::uint64_t inside = 1;
+  std::uint64_t outside = 1;
+  std::uint64_t count = 0;
+  return lines >> inside >> outside >> count && inside == 0 && outside == 0 && count == UINT32_MAX;
+}
+
+std::uint32_t outside_id(const std::string& uid_map, std::uint32_t id) {
+  std::istringstream lines{uid_map};
+  std::uint64_t inside = 0;
+  std::uint64_t outside = 0;
+  std::uint64_t count = 0;
+  while (lines >> inside >> outside >> count) {
+    if (id >= inside && id - inside < count)
+      return static_cast<std::uint32_t>(outside + id - inside);
+  }
+  return id;
+}
+
 bool has_capability(int capability) {
+  if (!is_whole_machine(uid_map())) return false;
   __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
   __user_cap_data_struct data[_LINUX_CAPABILITY_U32S_3] = {};
   if (syscall(SYS_capget, &header, data) != 0) return false;

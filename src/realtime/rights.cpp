@@ -24,6 +24,12 @@ Grants missing(const Grants& grants) {
   return found;
 }
 
+bool capabilities_would_help(const Grants& grants) {
+  return std::any_of(grants.begin(), grants.end(), [](const Grant& grant) {
+    return !grant.granted && (grant.right == Right::scheduling || grant.right == Right::memory);
+  });
+}
+
 std::string describe_missing(const Grants& grants, const std::string& indent) {
   std::string text;
   for (const Grant& grant : missing(grants)) {

@@ -39,6 +39,9 @@ using Grants = std::vector<Grant>;
 
 Grants missing(const Grants& grants);
 
+// Whether cap_sys_nice and cap_ipc_lock would grant some of what is missing.
+bool capabilities_would_help(const Grants& grants);
+
 // "scheduling: SCHED_FIFO 80 was refused: …; REMEDY", one line for each that is missing.
 std::string describe_missing(const Grants& grants, const std::string& indent);
 

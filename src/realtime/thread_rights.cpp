@@ -2,11 +2,13 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
 #include <sched.h>
 #include <unistd.h>
 
 #include <linux/capability.h>
 #include <sys/prctl.h>
+#include <system_error>
 
 #include "realtime/remedies.h"
 
@@ -20,6 +22,12 @@ constexpr std::size_t stack_reserve = std::size_t{256} << 10U;
 [[gnu::noinline]] void touch_stack() {
   volatile char reserve[stack_reserve];
   for (std::size_t i = 0; i < sizeof reserve; i += 1024) reserve[i] = 1;
+}
+
+bool control_groups_have_budgets() {
+  std::error_code ignored;
+  return std::filesystem::exists("/sys/fs/cgroup/cpu/cpu.rt_runtime_us", ignored) ||
+         std::filesystem::exists("/sys/fs/cgroup/cpu,cpuacct/cpu.rt_runtime_us", ignored);
 }
 
 Grant ask_for_priority(int priority) {
@@ -36,9 +44,10 @@ Grant ask_for_priority(int priority) {
     grant.state += ": the limit of real-time priority (RLIMIT_RTPRIO) is " + std::to_string(limit);
     grant.remedy = allow_priority(starter());
   } else {
-    // The last thing that the kernel looks at: CONFIG_RT_GROUP_SCHED.
-    grant.state += ": its control group has no real-time budget";
-    grant.remedy = "sudo sysctl -w kernel.sched_rt_runtime_us=-1";
+    const bool budgets = control_groups_have_budgets();
+    grant.state += budgets ? ": its control group has no real-time budget"
+                           : ": by a system call filter, or by the kernel's CONFIG_RT_GROUP_SCHED";
+    grant.remedy = allow_class(starter(), budgets);
   }
   return grant;
 }
@@ -96,9 +105,10 @@ Grant follow(const Settings& loop) {
           .remedy = "set [loop] priority to 2 or more"};
 }
 
+// The flag stays: without CAP_SYS_NICE nobody gets rid of it, and asking to is refused.
 void leave() noexcept {
   const sched_param none{.sched_priority = 0};
-  sched_setscheduler(0, SCHED_OTHER, &none);
+  sched_setscheduler(0, SCHED_OTHER | SCHED_RESET_ON_FORK, &none);
 }
 
 }  // namespace sinerig::realtime

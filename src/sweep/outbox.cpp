@@ -2,9 +2,16 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <thread>
 
 namespace sinerig {
+
+namespace {
+
+constexpr std::chrono::milliseconds before_next_try{1};
+
+}  // namespace
 
 RecordQueue::RecordQueue(std::size_t capacity)
     : slots_(std::bit_ceil(std::max<std::size_t>(capacity, 2))), mask_{slots_.size() - 1} {}
@@ -100,10 +107,10 @@ bool Outbox::flush() noexcept {
   return backlog_count_ <= backlog_.size() / 2 && !overdue_ && !abandoned();
 }
 
+// Asleep between tries: whoever closes may still have a priority above the consumer's.
 void Outbox::close() noexcept {
-  while (backlog_count_ > 0 && !abandoned()) {
-    empty_backlog();
-    std::this_thread::yield();
+  for (empty_backlog(); backlog_count_ > 0 && !abandoned(); empty_backlog()) {
+    std::this_thread::sleep_for(before_next_try);
   }
   closed_.store(true, std::memory_order_release);
 }

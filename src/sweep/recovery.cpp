@@ -28,6 +28,7 @@ Recovery::End Recovery::after_fault(std::uint32_t dwell, RunControl& control) no
                     .value = settings_.wait_s});
     if (const End end = wait(dwell, control); end != End::armed) return end;
     const std::string obstacle = rearm_->arm_again();
+    if (control.stop_requests.load(std::memory_order_relaxed) > 0) return End::stop_requested;
     if (obstacle.empty()) {
       sink_.put(Event{.kind = EventKind::rearmed, .dwell = dwell, .tick = clock_.now().tick});
       return End::armed;

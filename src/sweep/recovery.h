@@ -23,7 +23,8 @@ class Recovery {
   }
 
   // With the actuator released, outside the loop: each wait goes by the clock, a stop request cuts
-  // it short. Notes what it does.
+  // it short, that of arming, too:
+  // then the device may be armed. Notes what it does.
   End after_fault(std::uint32_t dwell, RunControl& control) noexcept;
 
   // Whether a dwell that a soft limit has ended may be tried again.

@@ -60,7 +60,7 @@ class Rearm {
   // While it is waited: a release that could not be carried out, on a dead bus, is tried again.
   virtual void keep_released() noexcept {}
 
-  // Empty when all devices are armed; else why not, and nothing is.
+  // Empty when all devices are armed; else why not, and nothing is: a stop request, too.
   virtual std::string arm_again() = 0;
 };
 

@@ -10,6 +10,12 @@ struct RunControl {
   std::atomic<int> stop_requests{0};  // 1: ramp down, 2: neutral at once
   std::atomic<std::uint32_t> dwell{0};
   std::atomic<std::uint64_t> tick{0};
+  std::atomic<std::uint64_t> turns{0};  // of waiting for a device, outside of the loop
+
+  // Moves on for as long as somebody gets on with the run.
+  std::uint64_t progress() const noexcept {
+    return tick.load(std::memory_order_relaxed) + turns.load(std::memory_order_relaxed);
+  }
 };
 
 }  // namespace sinerig

@@ -20,6 +20,7 @@ bool SweepRunner::recover(RunControl& control) noexcept {
   if (end == Recovery::End::used_up) return false;
   guard_.resume();
   if (end != Recovery::End::armed) {
+    actuator_.release();  // the stop may have come as it was armed
     guard_.stop(end == Recovery::End::stop_requested ? TripCause::stop_requested
                                                      : TripCause::recorder_stalled,
                 last_tick_);

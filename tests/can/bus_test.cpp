@@ -1,6 +1,7 @@
 // The CAN driver on a kernel's CAN stack: run inside tools/virtual-bench, on its vcan0.
 #include "drivers/can/bus.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
@@ -668,6 +669,55 @@ TEST_F(CanBus, AnOldAnswerIsNotTakenForTheNewOne) {
   bus.start();
   peer.send(frame_of(0x585, {0x60, 0x60, 0x60, 0, 0, 0, 0, 0}));
   EXPECT_THROW(actuator.start(), std::runtime_error);
+}
+
+// A list may wait for a minute, for a homing say: for an answer, or by a delay.
+TEST_F(CanBus, AStopWhileADeviceIsArmedEndsTheWaitDisarmsAndBeginsNoFurtherStep) {
+  constexpr std::int64_t an_hour_ns = 3'600'000'000'000;
+  for (const bool delay : {true, false}) {
+    RunControl control;
+    Peer peer;
+    const AnsweringPeer device([&](const Frame& frame) -> std::vector<Frame> {
+      if (frame.id == 0x0A) control.stop_requests = 1;
+      return {};
+    });
+    Bus bus("vcan0", false, Waiting{control});
+    CommandSettings command = torque_command();
+    Step home{"home", frame_of(0x0A, {1}), {}, 0, 1};
+    if (delay) {
+      home.delay_ns = an_hour_ns;
+    } else {
+      home.expect.emplace();
+      home.expect->pattern = pattern_of(0x585);
+      home.expect->timeout_ns = an_hour_ns;
+    }
+    command.arm = {home, {"enable", frame_of(0x0B, {1}), {}, 0, 1}};
+    command.disarm = {{"idle", frame_of(0x07, {1}), {}, 0, 1}};
+    CanActuator actuator(bus, command);
+    bus.start();
+    EXPECT_THROW(actuator.arm(), StopRequested);
+    EXPECT_TRUE(actuator.released());
+    const std::vector<Frame> seen = peer.received();
+    ASSERT_FALSE(seen.empty());
+    EXPECT_EQ(seen.back(), frame_of(0x07, {1}));
+    EXPECT_FALSE(std::ranges::any_of(seen, [](const Frame& frame) { return frame.id == 0x0B; }));
+  }
+}
+
+TEST_F(CanBus, ListsOnTheWayOutAreProgressAndNotCutShort) {
+  RunControl control;
+  control.stop_requests = 2;
+  Peer peer;
+  Bus bus("vcan0", false, Waiting{control});
+  CommandSettings command = torque_command();
+  command.disarm = {{"brake", frame_of(0x07, {1}), {}, 5'000'000'000, 1},
+                    {"idle", frame_of(0x08, {1}), {}, 0, 1}};
+  CanActuator actuator(bus, command);
+  bus.start();
+  actuator.write(0.0);
+  actuator.release();
+  EXPECT_TRUE(actuator.released());
+  EXPECT_GE(control.progress(), 100U) << "5 s, turn by turn";
 }
 
 TEST_F(CanBus, ADeviceThatFailsToArmIsDisarmed) {

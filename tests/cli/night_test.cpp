@@ -1,14 +1,17 @@
 // `sinerig night`: several sweeps as one job.
 #include <csignal>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <memory>
 #include <thread>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
 #include "cli/night_command.h"
+#include "drivers/device.h"
 #include "record/database.h"
 #include "record/sweep_reader.h"
 #include "sim/sim_driver.h"
@@ -166,6 +169,32 @@ TEST_F(Night, IsStoppedByASignalBetweenItsWaitAndTheSweep) {
   EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 4);
   EXPECT_EQ(time.waits.size(), 1U);
   EXPECT_FALSE(fs::exists(path("out/axis-1.sweep"))) << "nothing has moved";
+}
+
+// Told to stop while it is opened.
+class StoppedDevice final : public Device {
+ public:
+  void open(const Clock& /*clock*/) override {
+    std::raise(SIGTERM);
+    waiting().go_on();
+  }
+  Actuator* actuator() noexcept override { return nullptr; }
+  Sensor& sensor(std::size_t /*index*/) noexcept override { std::abort(); }
+};
+
+TEST_F(Night, IsStoppedByASignalBeforeASweepHasAFile) {
+  write("bare.toml",
+        "[loop]\nrate_hz = 500\n[sweep]\nstart_hz = 1\nstop_hz = 50\npoints = 5\n"
+        "amplitude = 0.5\n[limits]\n[actuator]\n[sensor.y]\n");
+  job("[[night.sweep]]\nrig = \"bare.toml\"\nrepeat = 2\n");
+  const DriverKit kit{.name = "sim", .summary = "", .configure = [](const DeviceRequest&) {
+                        return std::make_unique<StoppedDevice>();
+                      }};
+  cli::PassingTime time{1772398800};
+  const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+  EXPECT_EQ(cli::run_night(options, {kit}, time), 4);
+  EXPECT_FALSE(fs::exists(path("out/bare-1.sweep")));
+  for (const auto& sweep : summary().at("sweeps")) EXPECT_EQ(sweep.at("outcome"), "not run");
 }
 
 TEST_F(Night, IsDoneWhereASignalComesAfterItsLastSweep) {

@@ -1,15 +1,19 @@
 // What becomes of the actuator when a run fails outside of the loop.
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <optional>
 #include <stdexcept>
+#include <thread>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
 #include "cli/commands.h"
-#include "record/database.h"
+#include "record/sweep_reader.h"
 #include "support/fake_rig.h"
 
 namespace sinerig::cli {
@@ -21,6 +25,12 @@ struct Witness {
   double last = 99.0;
   int releases = 0;
   std::int64_t parts_when_caught_up = -1;  // in the sweep file, when the device was told last
+  std::size_t writes = 0;
+  // What happens while the device waits for its drive.
+  std::function<void(const Waiting&)> opening{};
+  std::function<void(const Waiting&)> arming{};
+  std::function<void(const Waiting&)> arming_again{};
+  std::optional<std::uint64_t> faulty_tick{};
 };
 
 // Moves its output on opening, and lets go of it at its end.
@@ -35,7 +45,20 @@ class FakeDevice final : public Device {
     actuator_.emplace(clock);
     actuator_->write(0.3);
     sensor_.emplace(clock, [this](std::uint64_t) { return actuator_->last; });
+    actuator_->fault_at = [this](std::uint64_t tick) {
+      const bool faulty = witness_.faulty_tick == tick;
+      if (faulty) witness_.faulty_tick.reset();
+      return faulty ? Fault::device : Fault::none;
+    };
     note();
+    if (witness_.opening) witness_.opening(waiting());
+  }
+  void arm() override {
+    if (witness_.arming) witness_.arming(waiting());
+  }
+  void rearm() override {
+    actuator_->released = false;
+    if (witness_.arming_again) witness_.arming_again(waiting());
   }
   void catch_up() override {
     record::Database database{file_, record::Database::Mode::read};
@@ -51,6 +74,7 @@ class FakeDevice final : public Device {
     if (!actuator_) return;
     witness_.last = actuator_->last;
     witness_.releases = actuator_->releases;
+    witness_.writes = actuator_->writes.size();
   }
   Witness& witness_;
   fs::path file_;
@@ -117,16 +141,66 @@ TEST_F(RunCommand, TellsTheDevicesToCatchUpOnceItsPartIsInTheFile) {
 
 TEST_F(RunCommand, ReleasesTheActuatorWhenTheDiskIsFull) {
   Witness witness;
-  std::signal(SIGXFSZ, SIG_IGN);
   rlimit before{};
   getrlimit(RLIMIT_FSIZE, &before);
   rlimit limit = before;
   limit.rlim_cur = 300'000;
   setrlimit(RLIMIT_FSIZE, &limit);
-  EXPECT_EQ(run_command(options(rig("")), {fake(witness)}), exit_stopped);
+  const int code = run_command(options(rig("")), {fake(witness)});
   setrlimit(RLIMIT_FSIZE, &before);
+  EXPECT_EQ(code, exit_stopped);
+  const record::StoredRun run = record::read_sweep(folder_ / "run.sweep");
+  EXPECT_TRUE(std::any_of(run.events.begin(), run.events.end(),
+                          [](const auto& event) { return event.kind == "released"; }));
   EXPECT_EQ(witness.last, 0.0);
   EXPECT_GE(witness.releases, 1);
+}
+
+// Homes for a minute, say, and is asked to stop meanwhile; or as the last step is taken. The loop's
+// thread leaves the signal to another.
+void be_stopped_waiting(const Waiting& waiting) {
+  kill(getpid(), SIGINT);
+  if (!waiting.pause_for(3'600'000'000'000)) throw StopRequested{};
+}
+void be_stopped_at_the_end(const Waiting& waiting) {
+  kill(getpid(), SIGINT);
+  while (waiting.may_go_on()) std::this_thread::yield();
+}
+void be_stopped_failing(const Waiting& waiting) {
+  be_stopped_at_the_end(waiting);
+  throw std::runtime_error{"connect: Interrupted system call"};
+}
+
+TEST_F(RunCommand, IsStoppedWhileADeviceIsOpenedOrArmed) {
+  std::signal(SIGINT, SIG_DFL);
+  for (const auto stopped : {be_stopped_waiting, be_stopped_at_the_end, be_stopped_failing}) {
+    for (const bool opening : {true, false}) {
+      Witness witness;
+      (opening ? witness.opening : witness.arming) = stopped;
+      EXPECT_EQ(run_command(options(rig("")), {fake(witness)}), exit_interrupted);
+      EXPECT_EQ(witness.last, 0.0);
+      EXPECT_EQ(witness.writes, 1U) << "by open()";
+      EXPECT_GE(witness.releases, opening ? 1 : 2) << "before it is closed, too";
+      EXPECT_FALSE(fs::exists(folder_ / "run.sweep"));
+    }
+  }
+}
+
+TEST_F(RunCommand, IsStoppedWhileADeviceIsArmedAgain) {
+  std::signal(SIGINT, SIG_DFL);
+  for (const auto stopped : {be_stopped_waiting, be_stopped_at_the_end, be_stopped_failing}) {
+    Witness witness;
+    witness.faulty_tick = 500;
+    witness.arming_again = stopped;
+    RunOptions again = options(rig("[retry]\nfaults = 5\nwait_s = 0.01\n"));
+    again.force = true;
+    EXPECT_EQ(run_command(again, {fake(witness)}), exit_interrupted);
+    EXPECT_EQ(witness.last, 0.0);
+    EXPECT_EQ(witness.writes, 503U) << "by open(), up to the fault, and neutral behind it";
+    const record::StoredRun run = record::read_sweep(folder_ / "run.sweep");
+    EXPECT_EQ(run.fact("outcome"), "interrupted");
+    EXPECT_THAT(run.fact("outcome_detail"), testing::Not(testing::HasSubstr("[retry]")));
+  }
 }
 
 }  // namespace

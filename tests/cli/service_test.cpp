@@ -1,8 +1,11 @@
 // What a service manager hears of a run.
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <future>
+#include <memory>
 #include <optional>
 #include <poll.h>
 #include <string>
@@ -12,15 +15,19 @@
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include "cli/commands.h"
 #include "cli/service_notifier.h"
+#include "drivers/device.h"
 #include "record/database.h"
 #include "record/sweep_reader.h"
+#include "support/fake_rig.h"
 #include "support/process.h"
 
 namespace sinerig {
 namespace {
 
 using cli::ServiceNotifier;
+using testing::Contains;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::StartsWith;
@@ -77,6 +84,8 @@ TEST_F(Service, IsFedByTheLoopsProgressAndNotByTime) {
   using std::chrono::milliseconds;
   Manager manager{socket_};
   ServiceNotifier service{socket_, std::chrono::seconds{1}};
+  service.ready();
+  manager.all();
   service.progress(5, start + milliseconds{1000});
   EXPECT_THAT(manager.all(), ElementsAre("WATCHDOG=1"));
   service.progress(6, start + milliseconds{1200});  // within a quarter of the period
@@ -100,6 +109,54 @@ TEST_F(Service, HearsOfReadinessStatusAndTheEnd) {
   service.stopping();
   EXPECT_THAT(manager.all(),
               ElementsAre("READY=1", "STATUS=point 1 of 2", "STATUS=point 2 of 2", "STOPPING=1"));
+}
+
+// What the manager counts itself: how long it takes to start and to stop.
+TEST_F(Service, IsGivenMoreTimeBeforeItIsReadyAndAfterItsEnd) {
+  const std::string longer = "EXTEND_TIMEOUT_USEC=60000000";
+  for (const bool watched : {false, true}) {
+    const std::string meal = watched ? "WATCHDOG=1" : "";
+    const std::string both = watched ? meal + "\n" + longer : longer;
+    Manager manager{socket_};
+    ServiceNotifier service{socket_, std::chrono::seconds{watched ? 1 : 0}};
+    service.progress(1, start + std::chrono::hours{1});
+    service.progress(1, start + std::chrono::hours{2});  // stands still
+    EXPECT_THAT(manager.all(), ElementsAre(both));
+    service.ready();
+    manager.all();
+    service.progress(2, start + std::chrono::hours{3});
+    EXPECT_EQ(manager.next(), meal);
+    service.stopping();
+    manager.all();
+    service.idle(start + std::chrono::hours{4});
+    EXPECT_THAT(manager.all(), ElementsAre(both));
+  }
+}
+
+TEST_F(Service, IsFedByTimeForSoLongAndNoLonger) {
+  const cli::SignOfLife time = cli::for_at_most(std::chrono::hours{1});
+  const std::uint64_t before = time();
+  EXPECT_NE(time(), before);
+  const cli::SignOfLife over = cli::for_at_most({});
+  EXPECT_EQ(over(), over());
+}
+
+TEST_F(Service, IsFedBesideWorkForAsLongAsThatShowsLife) {
+  Manager manager{socket_};
+  ServiceNotifier service{socket_, std::chrono::milliseconds{20}};
+  service.ready();
+  EXPECT_EQ(manager.next(), "READY=1");
+  std::atomic<std::uint64_t> turns{0};
+  const int code = cli::attended(
+      service, [&] { return turns.load(); },
+      [&] {
+        for (int meals = 0; meals < 5; ++meals) {
+          ++turns;
+          EXPECT_EQ(manager.next(patience_ms), "WATCHDOG=1");
+        }
+        return 7;
+      });
+  EXPECT_EQ(code, 7);
 }
 
 TEST_F(Service, IsFedByTimeWhereNoLoopIsToRun) {
@@ -142,7 +199,9 @@ TEST_F(Service, IsToldWhereARunIsUntilItIsStopped) {
   unsetenv("NOTIFY_SOCKET");
   unsetenv("WATCHDOG_USEC");
 
-  EXPECT_EQ(manager.next(patience_ms), "READY=1");
+  std::string first = manager.next(patience_ms);
+  while (first.find("EXTEND_TIMEOUT_USEC=") != std::string::npos) first = manager.next(patience_ms);
+  EXPECT_EQ(first, "READY=1");
   std::string last_status;
   for (int meals = 0; meals < 4;) {
     const std::string message = manager.next(patience_ms);
@@ -155,7 +214,60 @@ TEST_F(Service, IsToldWhereARunIsUntilItIsStopped) {
   EXPECT_THAT(last_status, HasSubstr(" left"));
   program.send(SIGTERM);
   EXPECT_EQ(program.finish().code, 4);
-  EXPECT_EQ(manager.all().back(), "STOPPING=1\nWATCHDOG=1");
+  EXPECT_THAT(manager.all(), Contains("STOPPING=1\nWATCHDOG=1"));
+}
+
+// Takes its time to be armed, and once more after its fault.
+class SlowDevice final : public Device {
+ public:
+  using Wait = std::function<void(const Waiting&)>;
+  explicit SlowDevice(Wait wait) : wait_{std::move(wait)} {}
+  void open(const Clock& clock) override {
+    actuator_.emplace(clock);
+    actuator_->fault_at = [](std::uint64_t tick) {
+      return tick == 10 ? Fault::device : Fault::none;
+    };
+    sensor_.emplace(clock, [](std::uint64_t) { return 0.0; });
+  }
+  void arm() override { wait_(waiting()); }
+  Actuator* actuator() noexcept override { return &*actuator_; }
+  Sensor& sensor(std::size_t /*index*/) noexcept override { return *sensor_; }
+
+ private:
+  Wait wait_;
+  std::optional<test::FakeActuator> actuator_;
+  std::optional<test::FakeSensor> sensor_;
+};
+
+// A list that waits for longer than the watchdog does, turn by turn.
+TEST_F(Service, IsFedWhileADeviceIsArmedAndArmedAgain) {
+  write("rig.toml",
+        "[loop]\nrate_hz = 500\n[sweep]\nspacing = \"list\"\nfrequencies_hz = [50]\n"
+        "amplitude = 0.5\n[retry]\nfaults = 1\nwait_s = 0.01\n[limits]\n[actuator]\n"
+        "[sensor.y]\n");
+  Manager manager{socket_};
+  setenv("NOTIFY_SOCKET", socket_.c_str(), 1);
+  setenv("WATCHDOG_USEC", "20000", 1);
+  int times_armed = 0;
+  const auto wait = [&](const Waiting& waiting) {
+    ++times_armed;
+    manager.all();
+    for (int meals = 0; meals < 8;) {
+      waiting.go_on();
+      const std::string message = manager.next(patience_ms);
+      ASSERT_NE(message, "");
+      if (message.starts_with("WATCHDOG=1")) ++meals;
+    }
+  };
+  const DriverKit kit{.name = "sim", .summary = "", .configure = [&](const DeviceRequest&) {
+                        return std::make_unique<SlowDevice>(wait);
+                      }};
+  const int code = cli::run_command(
+      {.rig = path("rig.toml"), .output = path("run.sweep"), .report = false}, {kit});
+  unsetenv("NOTIFY_SOCKET");
+  unsetenv("WATCHDOG_USEC");
+  EXPECT_EQ(code, cli::exit_done);
+  EXPECT_EQ(times_armed, 2);
 }
 
 // A service that ends well before it was ready has failed, to systemd.
@@ -237,7 +349,8 @@ TEST_F(NightService, IsReadyOnceAndStopsAtTheEndOfTheNight) {
   } while (message != stopping);
   EXPECT_TRUE(std::filesystem::exists(path("out/rig-3.sweep")));
   EXPECT_EQ(program_->finish().code, 0);
-  EXPECT_TRUE(manager.all().empty());
+  for (const std::string& later : manager.all())
+    EXPECT_THAT(later, HasSubstr("EXTEND_TIMEOUT_USEC="));
 }
 
 TEST_F(NightService, IsFedAndToldWhatItWaitsFor) {

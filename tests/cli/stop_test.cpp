@@ -17,7 +17,22 @@ using test::GuardedBench;
 
 constexpr int signals[] = {SIGINT, SIGTERM, SIGHUP};
 
-TEST(ASignal, ReleasesTheActuatorWithinTheRampAndTwoTicks) {
+// As in a terminal, whoever runs the tests: nohup and a script's background ignore some.
+class ASignal : public testing::Test {
+ protected:
+  ASignal() {
+    for (const int each : {SIGINT, SIGTERM, SIGHUP, SIGQUIT}) std::signal(each, SIG_DFL);
+  }
+};
+using ASecondSignal = ASignal;
+
+auto disposition_of(int signal) {
+  struct sigaction now {};
+  sigaction(signal, nullptr, &now);
+  return now.sa_handler;
+}
+
+TEST_F(ASignal, ReleasesTheActuatorWithinTheRampAndTwoTicks) {
   const std::uint64_t first_seed = test::seed(1);
   for (std::uint64_t i = 0; i < test::count(1000); ++i) {
     SCOPED_TRACE(testing::Message()
@@ -45,7 +60,7 @@ TEST(ASignal, ReleasesTheActuatorWithinTheRampAndTwoTicks) {
   }
 }
 
-TEST(ASecondSignal, LeavesTheRampForNeutralAtOnce) {
+TEST_F(ASecondSignal, LeavesTheRampForNeutralAtOnce) {
   const std::uint64_t first_seed = test::seed(1);
   for (std::uint64_t i = 0; i < test::count(1000); ++i) {
     SCOPED_TRACE(testing::Message()
@@ -72,7 +87,7 @@ TEST(ASecondSignal, LeavesTheRampForNeutralAtOnce) {
 }
 
 // Of those that follow, too: the run may be over, its file being written.
-TEST(ASignal, StopsWhateverIsAroundTheRun) {
+TEST_F(ASignal, StopsWhateverIsAroundTheRun) {
   RunControl night;
   const cli::StopOnSignal stops_the_night{night};
   {
@@ -85,6 +100,46 @@ TEST(ASignal, StopsWhateverIsAroundTheRun) {
   RunControl next;
   const cli::StopOnSignal stops_the_next{next};
   EXPECT_EQ(next.stop_requests.load(), 1) << "as if it had come a moment later";
+}
+
+TEST_F(ASignal, OfQuittingIsTwoRequestsAtOnce) {
+  RunControl run;
+  const cli::StopOnSignal stops_the_run{run};
+  ASSERT_NE(disposition_of(SIGQUIT), SIG_DFL);
+  std::raise(SIGQUIT);
+  EXPECT_EQ(run.stop_requests.load(), 2);
+}
+
+// What nohup, or a shell for its background, has seen to holds; but a service manager's does not.
+TEST_F(ASignal, ThatWasIgnoredBeforeStaysIgnored) {
+  for (const int each : {SIGHUP, SIGINT, SIGQUIT, SIGTERM}) {
+    std::signal(each, SIG_IGN);
+    RunControl night;
+    RunControl run;
+    {
+      const cli::StopOnSignal stops_the_night{night};
+      const cli::StopOnSignal stops_the_run{run};
+      std::raise(each);
+    }
+    EXPECT_EQ(run.stop_requests.load(), each == SIGTERM ? 1 : 0) << each;
+    EXPECT_EQ(night.stop_requests.load(), each == SIGTERM ? 1 : 0) << each;
+    EXPECT_EQ(disposition_of(each), SIG_IGN) << each;
+    std::signal(each, SIG_DFL);
+  }
+}
+
+TEST_F(ASignal, NeitherEndsNorFreezesARunWithItsCommandStanding) {
+  RunControl run;
+  {
+    const cli::StopOnSignal stops_the_run{run};
+    for (const int each : {SIGPIPE, SIGXFSZ, SIGTSTP, SIGTTIN, SIGTTOU}) {
+      ASSERT_EQ(disposition_of(each), SIG_IGN) << each;
+      std::raise(each);
+    }
+  }
+  EXPECT_EQ(run.stop_requests.load(), 0);
+  for (const int each : {SIGXFSZ, SIGTSTP, SIGTTIN, SIGTTOU})
+    EXPECT_EQ(disposition_of(each), SIG_DFL) << each;
 }
 
 class StoppedTwice : public test::ProgramTest {};

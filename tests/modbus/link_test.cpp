@@ -51,9 +51,15 @@ class RunningDrive {
       : server_{std::move(settings)}, thread_{[this] {
           server_.run(stop_, 1e9, 0.01);
         }} {}
-  ~RunningDrive() {
+  ~RunningDrive() { stop(); }
+  void stop() {
     stop_.store(true);
-    thread_.join();
+    if (thread_.joinable()) thread_.join();
+  }
+  // When it was switched on and off, up to its end.
+  std::string final_account() {
+    stop();
+    return server_.account();
   }
   int port() const {
     const std::string address = server_.address();
@@ -78,21 +84,23 @@ Place word_at(std::uint16_t address) {
 }
 
 struct Rig {
-  explicit Rig(sim::DriveSettings settings)
-      : serial{settings.serial}, drive{std::move(settings)}, link{link_settings()} {}
+  explicit Rig(sim::DriveSettings drive_settings, const Waiting& waiting = {})
+      : serial{drive_settings.serial},
+        drive{std::move(drive_settings)},
+        link{link_settings(), waiting} {}
 
   LinkSettings link_settings() const {
-    LinkSettings settings;
-    settings.connection.name = "drive";
-    settings.connection.serial = serial;
-    settings.connection.device = line_path();
-    settings.connection.baud = 1'000'000;
-    settings.connection.host = "127.0.0.1";
-    settings.connection.port = serial ? 0 : drive.port();
-    settings.period_ns = generous_ns;
-    settings.response_timeout_ns = timeout_ns;
-    settings.read_through = 8;  // one question for all
-    return settings;
+    LinkSettings to_drive;
+    to_drive.connection.name = "drive";
+    to_drive.connection.serial = serial;
+    to_drive.connection.device = line_path();
+    to_drive.connection.baud = 1'000'000;
+    to_drive.connection.host = "127.0.0.1";
+    to_drive.connection.port = serial ? 0 : drive.port();
+    to_drive.period_ns = generous_ns;
+    to_drive.response_timeout_ns = timeout_ns;
+    to_drive.read_through = 8;  // one question for all
+    return to_drive;
   }
 
   static Step write(const char* name, double value) {
@@ -110,18 +118,18 @@ struct Rig {
     return step;
   }
   static CommandSettings command() {
-    CommandSettings settings;
-    settings.place = number_at(16);
-    settings.arm = {write("enable", 1.0), expect_on()};
-    settings.disarm = {write("disable", 0.0)};
-    settings.health = {{.name = "state",
-                        .place = word_at(32),
-                        .comparison = {.sign = Comparison::Operator::equal, .value = 1.0}}};
-    return settings;
+    CommandSettings made;
+    made.place = number_at(16);
+    made.arm = {write("enable", 1.0), expect_on()};
+    made.disarm = {write("disable", 0.0)};
+    made.health = {{.name = "state",
+                    .place = word_at(32),
+                    .comparison = {.sign = Comparison::Operator::equal, .value = 1.0}}};
+    return made;
   }
 
   void open() {
-    actuator.emplace(link, command());
+    actuator.emplace(link, settings);
     position.emplace(link, FeedbackSettings{number_at(34)}, "[sensor.position]", true);
     torque.emplace(link, FeedbackSettings{number_at(42)}, "[sensor.torque]", false);
     link.open();
@@ -140,6 +148,7 @@ struct Rig {
 
   bool serial;
   std::int64_t timeout_ns = generous_ns / 2;
+  CommandSettings settings = command();
   RunningDrive drive;
   Link link;
   std::optional<ModbusActuator> actuator;
@@ -208,6 +217,51 @@ TEST_P(ModbusLink, ReleaseWritesNeutralAndDisarmsWhateverWasHandedOver) {
   EXPECT_EQ(number(number_at(16)), 0.0);
   EXPECT_EQ(number(number_at(42)), 0.0);
   EXPECT_EQ(number(word_at(32)), 0.0);
+}
+
+// A list may wait for a minute, for a homing say; so may one that switches on again.
+TEST_P(ModbusLink, AStopWhileItIsArmedEndsTheWaitDisarmsAndBeginsNoFurtherStep) {
+  RunControl control;
+  Rig rig{drive_settings(GetParam()), Waiting{control}};
+  rig.settings = Rig::command();
+  Step homed = Rig::expect_on();
+  homed.expect->value = 77.0;
+  homed.timeout_ns = 3'600'000'000'000;
+  rig.settings.startup = {Rig::write("off", 0.0)};
+  rig.settings.arm = {homed, Rig::write("enable", 1.0), Rig::expect_on()};
+  rig.settings.disarm = {Rig::write("disable", 0.0)};
+  rig.open();
+  const std::uint64_t before = control.progress();
+  std::thread someone{[&] {
+    while (control.progress() < before + 5) std::this_thread::yield();
+    control.stop_requests = 1;
+  }};
+  EXPECT_THROW(rig.actuator->arm(), StopRequested);
+  someone.join();
+  EXPECT_TRUE(rig.actuator->released());
+  EXPECT_THROW(rig.actuator->start(), StopRequested);
+  EXPECT_EQ(rig.drive.final_account(), "");
+}
+
+TEST_P(ModbusLink, ListsOnTheWayOutAreProgressAndNotCutShort) {
+  RunControl control;
+  Rig rig{drive_settings(GetParam()), Waiting{control}};
+  rig.settings = Rig::command();
+  rig.settings.disarm = {Rig::write("disable", 0.0), Rig::write("once more", 0.0)};
+  rig.open();
+  rig.actuator->arm();
+  control.stop_requests = 2;
+  const std::uint64_t before = control.progress();
+  rig.actuator->release();
+  EXPECT_TRUE(rig.actuator->released());
+  EXPECT_GE(control.progress(), before + 2);
+}
+
+TEST_P(ModbusLink, AStopWhileItIsOpenedEndsThat) {
+  RunControl control;
+  control.stop_requests = 1;
+  Rig rig{drive_settings(GetParam()), Waiting{control}};
+  EXPECT_THROW(rig.open(), StopRequested);
 }
 
 // Writes or reads one number beside the driver.

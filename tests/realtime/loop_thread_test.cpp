@@ -1,6 +1,7 @@
 // The thread of the loop has what its grants say, and says what it has not.
 #include "realtime/loop_thread.h"
 
+#include <cerrno>
 #include <csignal>
 #include <cstdio>
 #include <fstream>
@@ -10,10 +11,13 @@
 #include <unistd.h>
 
 #include <gmock/gmock.h>
+#include <linux/capability.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 
+#include "realtime/process_rights.h"
 #include "realtime/remedies.h"
+#include "realtime/thread_rights.h"
 
 namespace sinerig::realtime {
 namespace {
@@ -91,7 +95,7 @@ TEST(LoopThread, HasWhatItsGrantsSay) {
   EXPECT_FALSE(sigismember(&inside.blocked, SIGSEGV));
   // The slack of a real-time thread is 0 whatever was set; after it, it shows again.
   EXPECT_LE(inside.slack_ns, 1);
-  EXPECT_EQ(afterwards.policy, SCHED_OTHER);
+  EXPECT_EQ(afterwards.policy & ~SCHED_RESET_ON_FORK, SCHED_OTHER);
   EXPECT_EQ(afterwards.thread, inside.thread);
   EXPECT_NE(inside.thread, gettid());
 }
@@ -152,6 +156,21 @@ TEST(LoopThreadDeathTest, OfNobodyNamesEachRightThatIsMissingAndWhatToDo) {
               "KiB and must be unlimited; .*memlock");
 }
 
+// In a process of its own: with the priority and without the capability, as someone in limits.d.
+[[noreturn]] void enter_and_leave_as_someone() {
+  const Grant granted = enter({.priority = 20}).front();
+  if (!granted.granted || setresuid(65534, 65534, 65534) != 0) std::_Exit(2);
+  leave();
+  std::_Exit((sched_getscheduler(0) & ~SCHED_RESET_ON_FORK) == SCHED_OTHER ? 0 : 1);
+}
+
+TEST(LoopThreadDeathTest, GivesThePriorityBackWithoutACapability) {
+  testing::FLAGS_gtest_death_test_style = "threadsafe";
+  if (geteuid() != 0 || !has_capability(CAP_SYS_NICE))
+    GTEST_SKIP() << "takes root to have the priority and to become someone else";
+  EXPECT_EXIT(enter_and_leave_as_someone(), testing::ExitedWithCode(0), "");
+}
+
 TEST(Remedies, DependOnWhoStartedTheProgram) {
   const Starter person{.kind = Starter::Kind::person, .name = "ada"};
   EXPECT_EQ(allow_priority(person),
@@ -175,6 +194,59 @@ TEST(Remedies, DependOnWhoStartedTheProgram) {
             "start the container with --cap-add SYS_NICE --ulimit rtprio=99");
   EXPECT_THAT(allow_locked_memory(container), HasSubstr("--ulimit memlock=-1"));
   EXPECT_THAT(allow_cpu_latency(container), HasSubstr("--device /dev/cpu_dma_latency"));
+}
+
+TEST(Remedies, OfAMissingLatencyFileDependOnWhatThereIs) {
+  const Starter person{.kind = Starter::Kind::person, .name = "ada"};
+  const Starter service{.kind = Starter::Kind::service, .name = "sinerig@gimbal.service"};
+  const Starter container{.kind = Starter::Kind::container, .name = "root"};
+  for (const Starter& starter : {person, service, container}) {
+    const Grant none = without_latency_file(ENOENT, starter, false);
+    EXPECT_TRUE(none.granted);
+    EXPECT_THAT(none.state, HasSubstr("no idle states"));
+    EXPECT_EQ(none.remedy, "");
+    const Grant refused = without_latency_file(EACCES, starter, true);
+    EXPECT_FALSE(refused.granted);
+    EXPECT_EQ(refused.remedy, allow_cpu_latency(starter));
+  }
+  EXPECT_THAT(without_latency_file(ENOENT, container, true).remedy,
+              HasSubstr("--device /dev/cpu_dma_latency"));
+  EXPECT_THAT(without_latency_file(ENOENT, service, true).remedy, HasSubstr("PrivateDevices=no"));
+  EXPECT_THAT(without_latency_file(ENOENT, person, true).remedy, HasSubstr("CONFIG_CPU_IDLE"));
+}
+
+TEST(Remedies, OfARefusedClassLeaveTheThrottlingOn) {
+  const Starter person{.kind = Starter::Kind::person, .name = "ada"};
+  const Starter service{.kind = Starter::Kind::service, .name = "sinerig@gimbal.service"};
+  const Starter container{.kind = Starter::Kind::container, .name = "root"};
+  for (const Starter& starter : {person, service, container}) {
+    EXPECT_THAT(allow_class(starter, false), testing::Not(HasSubstr("sched_rt_runtime_us")));
+    EXPECT_THAT(allow_class(starter, true), HasSubstr("sched_rt_runtime_us=-1"));
+  }
+  EXPECT_THAT(allow_class(service, false), HasSubstr("RestrictRealtime=no"));
+}
+
+TEST(Capabilities, AreOfferedForWhatTheyGrant) {
+  const auto grants = [](Right missing) {
+    Grants all;
+    for (const Right right : {Right::scheduling, Right::memory, Right::heap, Right::idle_states})
+      all.push_back({.right = right, .granted = right != missing, .state = {}, .remedy = {}});
+    return all;
+  };
+  EXPECT_TRUE(capabilities_would_help(grants(Right::scheduling)));
+  EXPECT_TRUE(capabilities_would_help(grants(Right::memory)));
+  EXPECT_FALSE(capabilities_would_help(grants(Right::idle_states)));
+  EXPECT_FALSE(capabilities_would_help(grants(Right::cpu)));
+}
+
+TEST(Capabilities, CountOutsideOfUserNamespacesOnly) {
+  EXPECT_TRUE(is_whole_machine("         0          0 4294967295\n"));
+  EXPECT_FALSE(is_whole_machine("         0       1000          1\n"));
+  EXPECT_FALSE(is_whole_machine("         0     100000      65536\n"));
+  EXPECT_FALSE(is_whole_machine(""));
+  EXPECT_EQ(outside_id("0 1000 1\n1 100000 65536\n", 0), 1000U);
+  EXPECT_EQ(outside_id("0 1000 1\n1 100000 65536\n", 33), 100032U);
+  EXPECT_EQ(outside_id("0 0 4294967295\n", 1000), 1000U);
 }
 
 }  // namespace

@@ -97,6 +97,25 @@ TEST_F(Machine, LooksAtTheCpuOfTheRigFile) {
   EXPECT_TRUE(own["governor"].ok);
 }
 
+TEST_F(Machine, WithACpuApartThatTheLoopDoesNotUseIsNotInOrder) {
+  put_cpus("1", "performance");
+  auto findings = examine();
+  EXPECT_EQ(findings["isolcpus"].state,
+            "CPU 1 is kept free of ordinary threads, but [loop] cpu names none");
+  EXPECT_EQ(findings["isolcpus"].remedy, "set [loop] cpu = 1");
+  EXPECT_FALSE(findings["nohz_full"].ok);
+}
+
+TEST_F(Machine, HasARealTimeKernelWhereItsVersionSaysSo) {
+  put("proc/sys/kernel/version", "#1 SMP PREEMPT_RT Debian 6.12.57-1 (2025-11-05)");
+  EXPECT_TRUE(examine()["kernel"].ok);
+  put("proc/sys/kernel/version", "#1 SMP PREEMPT_DYNAMIC Debian 6.12.57-1 (2025-11-05)");
+  EXPECT_FALSE(examine()["kernel"].ok);
+  EXPECT_EQ(realtime_kernel("x86_64"), "sudo apt install linux-image-rt-amd64, then boot it");
+  EXPECT_EQ(realtime_kernel("aarch64"), "sudo apt install linux-image-rt-arm64, then boot it");
+  EXPECT_EQ(realtime_kernel("riscv64"), "boot a kernel that is built with CONFIG_PREEMPT_RT");
+}
+
 TEST_F(Machine, WithoutTheFilesIsSaidToBeUnknown) {
   auto findings = examine();
   EXPECT_FALSE(findings["kernel"].ok);

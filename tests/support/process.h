@@ -41,6 +41,8 @@ class Program {
       close(pipe_ends[1]);
       return;
     }
+    // Whoever runs the tests: nohup and a script's background ignore some.
+    for (const int each : {SIGINT, SIGQUIT, SIGHUP, SIGPIPE}) std::signal(each, SIG_DFL);
     const int null = open("/dev/null", O_RDONLY);
     const int err = open(err_.c_str(), O_WRONLY | O_CREAT | O_TRUNC, 0600);
     if (input == Stdin::null) {

@@ -41,6 +41,8 @@ class TrippingDrive final : public Rearm {
   std::string arm_again() override {
     EXPECT_TRUE(bench_.actuator.released);
     armed_at.push_back(bench_.clock.tick());
+    if (stop_while_arming) bench_.control.stop_requests = 1;
+    bench_.actuator.released = refusals > 0;
     if (refusals > 0) {
       --refusals;
       return "the drive does not answer";
@@ -54,6 +56,7 @@ class TrippingDrive final : public Rearm {
   bool tripped = false;
   std::vector<std::uint64_t> released_at;
   int refusals = 0;
+  bool stop_while_arming = false;
   std::vector<std::uint64_t> armed_at;
 
  private:
@@ -94,6 +97,21 @@ TEST(AFault, IsFollowedByTriesToReleaseForAsLongAsItIsWaited) {
   bench.runner_settings.retry = {.faults = 2, .wait_s = 2.0};
   bench.run(&drive);
   EXPECT_EQ(drive.released_at, (std::vector<std::uint64_t>{81, 581, 1081, 1581}));
+}
+
+TEST(AFault, IsNotFollowedByACommandWhereAStopIsRequestedWhileItIsArmedAgain) {
+  for (const bool refuses : {false, true}) {
+    GuardedBench bench;
+    TrippingDrive drive{bench, {80}};
+    drive.stop_while_arming = true;
+    drive.refusals = refuses ? 1 : 0;
+    bench.runner_settings.retry = {.faults = 5, .wait_s = 0.5};
+    const RunOutcome outcome = bench.run(&drive);
+    EXPECT_EQ(outcome.trip.cause, TripCause::stop_requested);
+    EXPECT_EQ(drive.armed_at.size(), 1U);
+    EXPECT_TRUE(bench.actuator.released);
+    EXPECT_LE(bench.actuator.writes.back().tick, 81U);
+  }
 }
 
 TEST(AFault, StopsTheSweepWhereItIsNotToBeRetried) {
