@@ -1,5 +1,6 @@
 #include "record/recorder.h"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -64,11 +65,12 @@ void Recorder::drain() {
 }
 
 void Recorder::take_down(const Record& record) {
+  const auto taken = std::chrono::steady_clock::now();
   if (samples_ == Samples::written || !std::holds_alternative<TickSamples>(record)) {
     writer_.write(record);
   }
   if (const auto* timing = std::get_if<DwellTiming>(&record)) {
-    end_dwell(*timing);
+    end_dwell(*timing, std::chrono::steady_clock::now() - taken);
   } else if (std::holds_alternative<Point>(record)) {
     points_.push_back(record);
   } else if (observer_ && !std::holds_alternative<Lesson>(record)) {
@@ -76,10 +78,11 @@ void Recorder::take_down(const Record& record) {
   }
 }
 
-// Its points are on the disk now: the loop and whoever watches may know.
-void Recorder::end_dwell(const DwellTiming& timing) {
-  const auto lag = static_cast<double>(outbox_.acknowledge());
-  if (tick_s_ > 0.0) writer_.note_lag(timing.dwell, lag * tick_s_);
+// Its points are on the disk now: the loop and whoever watches may know. The ticks since tell how
+// long that took, but after the last dwell there are none.
+void Recorder::end_dwell(const DwellTiming& timing, std::chrono::duration<double> writing) {
+  const auto ticks = static_cast<double>(outbox_.acknowledge());
+  if (tick_s_ > 0.0) writer_.note_lag(timing.dwell, std::max(ticks * tick_s_, writing.count()));
   if (observer_) {
     for (const Record& point : points_) observer_(point);
     observer_(timing);

@@ -1,6 +1,7 @@
 // The thread beside the loop: takes records from the outbox and writes them down.
 #pragma once
 
+#include <chrono>
 #include <exception>
 #include <functional>
 #include <thread>
@@ -37,7 +38,7 @@ class Recorder {
  private:
   void drain();
   void take_down(const Record& record);
-  void end_dwell(const DwellTiming& timing);
+  void end_dwell(const DwellTiming& timing, std::chrono::duration<double> writing);
   void save_the_rest() noexcept;
 
   Outbox& outbox_;

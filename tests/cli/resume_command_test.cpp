@@ -201,6 +201,15 @@ TEST_F(Resume, ADiskThatIsTooSlowStopsTheRun) {
   EXPECT_EQ(record::read_sweep(path("run.sweep")).fact("outcome"), "stopped");
 }
 
+TEST_F(Resume, TheLastPointWaitsForTheDiskAsAllDo) {
+  std::string text = rig("clock = \"monotonic\"", "4");
+  text.replace(text.find("[50, 20, 10]"), 12, "[50]");
+  text.replace(text.find("max_lag_s = 0.05"), 16, "max_lag_s = 10");
+  write("rig.toml", text);
+  EXPECT_EQ(faulty("slow=100", "run rig.toml -o run.sweep --quiet --no-report").code, 0);
+  EXPECT_GE(record::read_sweep(path("run.sweep")).lag_s.at(0), 0.1);
+}
+
 // `sinerig run --resume`: what a service manager calls again and again.
 class RunOrResume : public Resume {
  protected:

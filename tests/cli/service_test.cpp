@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <future>
 #include <memory>
@@ -288,6 +289,18 @@ TEST_F(Service, IsReadyWhereNothingIsLeftToMeasure) {
   EXPECT_THAT(manager.all(), ElementsAre("READY=1", "STOPPING=1"));
 }
 
+// No sync of a faulty disk returns while it is there.
+class HeldDisk {
+ public:
+  explicit HeldDisk(std::filesystem::path file) : file_{std::move(file)} { std::ofstream{file_}; }
+  ~HeldDisk() { std::filesystem::remove(file_); }
+  HeldDisk(const HeldDisk&) = delete;
+  HeldDisk& operator=(const HeldDisk&) = delete;
+
+ private:
+  std::filesystem::path file_;
+};
+
 // From the end of the loop on no tick feeds the watchdog, and the disk may take longer than that
 // waits.
 TEST_F(Service, IsStoppingWhileTheLastPointsWaitForTheDisk) {
@@ -305,14 +318,15 @@ TEST_F(Service, IsStoppingWhileTheLastPointsWaitForTheDisk) {
   std::future<int> ended =
       std::async(std::launch::async, [&] { return std::system(command.c_str()); });
   EXPECT_EQ(manager.next(patience_ms), "READY=1") << read("errors");
-  write("held", "");
-  std::string message;
-  do {
-    message = manager.next(patience_ms);
-  } while (!message.empty() && message != "STOPPING=1");
-  EXPECT_EQ(message, "STOPPING=1");
-  EXPECT_TRUE(record::read_sweep(path("rig.sweep")).responses.at(0).points.empty());
-  std::filesystem::remove(path("held"));
+  {
+    const HeldDisk held{folder_ / "held"};
+    std::string message;
+    do {
+      message = manager.next(patience_ms);
+    } while (!message.empty() && message != "STOPPING=1");
+    EXPECT_EQ(message, "STOPPING=1");
+    EXPECT_TRUE(record::read_sweep(path("rig.sweep")).responses.empty());
+  }
   EXPECT_EQ(WEXITSTATUS(ended.get()), 0) << read("errors");
 }
 
