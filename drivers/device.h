@@ -18,6 +18,7 @@ namespace sinerig {
 struct Remark {
   std::string text;
   bool stops_a_sweep = false;
+  bool doubts = false;  // what was measured: said at the end of a run, too
 };
 
 // The channels of one rig that one driver serves. Configured without touching anything, so that a

@@ -1,6 +1,7 @@
 #include "drivers/gpio/encoder.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <stdexcept>
 
 namespace sinerig::gpio {
@@ -63,7 +64,10 @@ bool Encoder::gather() noexcept {
   if (!taken) return false;
   const std::size_t end = waiting_count_ + *taken;
   for (std::size_t n = waiting_count_; n < end; ++n) {
-    if (waiting_[n].time_ns <= last_time_ns_) ++late_;
+    if (waiting_[n].time_ns <= last_time_ns_) {
+      ++late_;
+      latest_ns_ = std::max(latest_ns_, last_time_ns_ - waiting_[n].time_ns);
+    }
     for (std::size_t m = n; m > 0 && ahead(waiting_[m].sequence, waiting_[m - 1].sequence) < 0; --m)
       std::swap(waiting_[m], waiting_[m - 1]);
   }
@@ -96,6 +100,20 @@ std::string Encoder::reason() const {
   if (errors() <= settings_.max_errors) return "";
   return std::to_string(decoder_.illegal()) + " illegal transitions and " + std::to_string(lost_) +
          " lost edges (errors_max = " + std::to_string(settings_.max_errors) + ")";
+}
+
+std::string Encoder::seen() const {
+  std::string text = std::to_string(decoder_.illegal()) + " illegal transitions, " +
+                     std::to_string(lost_) + " lost edges";
+  if (!doubtful()) return text;
+  const double lag_s = static_cast<double>(settings_.lag_ns) * 1e-9;
+  const double latest_s = static_cast<double>(latest_ns_) * 1e-9;
+  char late[160];
+  std::snprintf(late, sizeof late,
+                ", %llu edges later than lag_s = %g by up to %.2g s: samples before them miss "
+                "counts; lag_s = %.2g has room for them",
+                static_cast<unsigned long long>(late_), lag_s, latest_s, 1.5 * (lag_s + latest_s));
+  return text + late;
 }
 
 }  // namespace sinerig::gpio

@@ -42,10 +42,20 @@ class Encoder final : public Sensor {
   std::int64_t count() const noexcept { return decoder_.count(); }
   std::uint64_t illegal() const noexcept { return decoder_.illegal(); }
   std::uint64_t lost() const noexcept { return lost_; }  // overflow of the kernel's queue
-  std::uint64_t late() const noexcept { return late_; }  // edges older than the sample before
+  // Edges that came after a sample which they should have been in, and by how much the worst did.
+  std::uint64_t late() const noexcept { return late_; }
+  std::int64_t latest_ns() const noexcept { return latest_ns_; }
 
   // Why it is no longer believed, for people; empty while it is. Not for the loop.
   std::string reason() const;
+
+  // What it has seen so far, for people. Not for the loop.
+  std::string seen() const;
+
+  // Whether samples without a fault were wrong: by an edge that came later than the lag allows for.
+  bool doubtful() const noexcept {
+    return late_ > 0 && settings_.samples == EncoderSettings::Samples::count;
+  }
 
  private:
   static constexpr std::size_t capacity = std::size_t{2} * EdgeLines::queue_length;
@@ -65,6 +75,7 @@ class Encoder final : public Sensor {
   std::uint64_t lost_ = 0;
   std::uint64_t forgiven_ = 0;  // errors before the last catch_up()
   std::uint64_t late_ = 0;
+  std::int64_t latest_ns_ = 0;
   bool gone_ = false;
   bool crossed_ = false;  // an edge was counted by this read
   std::int64_t last_time_ns_ = 0;

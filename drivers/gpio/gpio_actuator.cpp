@@ -15,6 +15,8 @@ Sample GpioActuator::write(double command) noexcept {
   if (out) {
     held_.value = drive.applied;
     held_.time_ns = before_ns + (after_ns - before_ns) / 2;
+  } else {
+    modulator_->take_back();
   }
   Sample answer = held_;
   answer.fault = !out ? Fault::bus : !number ? Fault::range : Fault::none;

@@ -49,6 +49,16 @@ class GpioDevice final : public Device {
     return actuator_ ? actuator_->reason() : "";
   }
 
+  std::vector<Remark> remarks() const override {
+    std::vector<Remark> remarks;
+    for (const Input& input : inputs_) {
+      if (input.encoder == nullptr) continue;
+      remarks.push_back(
+          {.text = input.name + ": " + input.encoder->seen(), .doubts = input.encoder->doubtful()});
+    }
+    return remarks;
+  }
+
   bool measures(std::size_t index) const override {
     return !std::holds_alternative<InterlockSettings>(inputs_[index].plan.settings);
   }

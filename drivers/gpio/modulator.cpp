@@ -15,82 +15,88 @@ constexpr double step_threshold = 0.5 * (1.0 + 1e-9);
 }  // namespace
 
 Drive DensityModulator::next(double command) noexcept {
+  before_ = state_;
   const double wanted = std::clamp(command, std::min(settings_.low, settings_.high),
                                    std::max(settings_.low, settings_.high));
-  error_ += wanted;
-  if (held_ == 0) {
+  state_.error += wanted;
+  if (state_.held == 0) {
     const double per_decision = static_cast<double>(settings_.hold_ticks);
-    const double off_by = error_ - wanted + per_decision * wanted;  // when held as long
+    const double off_by = state_.error - wanted + per_decision * wanted;  // when held as long
     const double middle = per_decision * (0.5 * (settings_.low + settings_.high) +
                                           dither_.next() * (settings_.high - settings_.low));
-    active_ = (settings_.high > settings_.low) == (off_by > middle);
+    state_.active = (settings_.high > settings_.low) == (off_by > middle);
   }
-  held_ = (held_ + 1) % settings_.hold_ticks;
-  const double applied = active_ ? settings_.high : settings_.low;
-  error_ -= applied;
-  return {.levels = active_ ? line_bit : 0, .applied = applied};
+  state_.held = (state_.held + 1) % settings_.hold_ticks;
+  const double applied = state_.active ? settings_.high : settings_.low;
+  state_.error -= applied;
+  return {.levels = state_.active ? line_bit : 0, .applied = applied};
 }
 
 Drive DensityModulator::rest() noexcept {
-  error_ = 0.0;
-  held_ = 0;
-  active_ = false;
+  state_.error = 0.0;
+  state_.held = 0;
+  state_.active = false;
   return {.levels = 0, .applied = settings_.low};
 }
 
 Drive SignMagnitudeModulator::next(double command) noexcept {
+  before_ = state_;
   const double wanted = std::clamp(command, -settings_.full, settings_.full);
-  error_ += wanted;
-  if (pause_left_ > 0) {
-    --pause_left_;
-    if (pause_left_ == 0) negative_ = !negative_;
-    on_ = false;
-    held_ = 0;
+  state_.error += wanted;
+  if (state_.pause_left > 0) {
+    --state_.pause_left;
+    if (state_.pause_left == 0) state_.negative = !state_.negative;
+    state_.on = false;
+    state_.held = 0;
   } else {
-    if (held_ == 0) decide(wanted);
-    held_ = pause_left_ > 0 ? 0 : (held_ + 1) % settings_.hold_ticks;
+    if (state_.held == 0) decide(wanted);
+    state_.held = state_.pause_left > 0 ? 0 : (state_.held + 1) % settings_.hold_ticks;
   }
-  const double applied = !on_ ? 0.0 : negative_ ? -settings_.full : settings_.full;
+  const double applied = !state_.on ? 0.0 : state_.negative ? -settings_.full : settings_.full;
   // What the pauses cost is made up for, but never more than one pause and one decision of it.
   const double most =
       settings_.full * static_cast<double>(settings_.hold_ticks + settings_.reversal_ticks);
-  error_ = std::clamp(error_ - applied, -most, most);
-  return {.levels = (on_ ? line_bit : 0) | (negative_ ? direction_bit : 0), .applied = applied};
+  state_.error = std::clamp(state_.error - applied, -most, most);
+  return {.levels = (state_.on ? line_bit : 0) | (state_.negative ? direction_bit : 0),
+          .applied = applied};
 }
 
 void SignMagnitudeModulator::decide(double wanted) noexcept {
   const double per_decision = static_cast<double>(settings_.hold_ticks);
-  const double off_by = error_ - wanted + per_decision * wanted;  // when held as long
-  on_ = std::abs(off_by) > (0.5 + dither_.next()) * per_decision * settings_.full;
-  const bool reverses = on_ && (off_by < 0.0) != negative_;
+  const double off_by = state_.error - wanted + per_decision * wanted;  // when held as long
+  state_.on = std::abs(off_by) > (0.5 + dither_.next()) * per_decision * settings_.full;
+  const bool reverses = state_.on && (off_by < 0.0) != state_.negative;
   if (!reverses) return;
   if (settings_.reversal_ticks == 0) {
-    negative_ = !negative_;
+    state_.negative = !state_.negative;
     return;
   }
-  on_ = false;
-  pause_left_ = settings_.reversal_ticks - 1;
-  if (pause_left_ == 0) negative_ = !negative_;
+  state_.on = false;
+  state_.pause_left = settings_.reversal_ticks - 1;
+  if (state_.pause_left == 0) state_.negative = !state_.negative;
 }
 
 Drive SignMagnitudeModulator::rest() noexcept {
-  error_ = 0.0;
-  held_ = 0;
-  pause_left_ = 0;
-  on_ = false;
-  return {.levels = negative_ ? direction_bit : 0, .applied = 0.0};
+  state_.error = 0.0;
+  state_.held = 0;
+  state_.pause_left = 0;
+  state_.on = false;
+  return {.levels = state_.negative ? direction_bit : 0, .applied = 0.0};
 }
 
 Drive StepModulator::next(double command) noexcept {
-  since_step_ = std::min(since_step_ + 1, settings_.min_ticks);
-  const double ahead = (command - settings_.origin) / settings_.step - static_cast<double>(steps_);
-  if (since_step_ < settings_.min_ticks || std::abs(ahead) <= step_threshold) return drive(false);
-  if ((ahead < 0.0) != negative_) {
-    negative_ = !negative_;
+  before_ = state_;
+  state_.since_step = std::min(state_.since_step + 1, settings_.min_ticks);
+  const double ahead =
+      (command - settings_.origin) / settings_.step - static_cast<double>(state_.steps);
+  if (state_.since_step < settings_.min_ticks || std::abs(ahead) <= step_threshold)
+    return drive(false);
+  if ((ahead < 0.0) != state_.negative) {
+    state_.negative = !state_.negative;
     return drive(false);
   }
-  steps_ += negative_ ? -1 : 1;
-  since_step_ = 0;
+  state_.steps += state_.negative ? -1 : 1;
+  state_.since_step = 0;
   return drive(true);
 }
 
@@ -99,8 +105,8 @@ Drive StepModulator::rest() noexcept {
 }
 
 Drive StepModulator::drive(bool active) const noexcept {
-  return {.levels = (active ? line_bit : 0) | (negative_ ? direction_bit : 0),
-          .applied = settings_.origin + static_cast<double>(steps_) * settings_.step};
+  return {.levels = (active ? line_bit : 0) | (state_.negative ? direction_bit : 0),
+          .applied = settings_.origin + static_cast<double>(state_.steps) * settings_.step};
 }
 
 }  // namespace sinerig::gpio

@@ -21,6 +21,9 @@ class Modulator {
   // The next tick's levels. `command` is finite.
   virtual Drive next(double command) noexcept SINERIG_NONBLOCKING = 0;
 
+  // The lines refused the last next(): they still hold what was before it, and so does this.
+  virtual void take_back() noexcept SINERIG_NONBLOCKING = 0;
+
   // What the output does when nothing more is asked of it: the last drive with the line inactive.
   virtual Drive rest() noexcept = 0;
 };
@@ -60,14 +63,20 @@ class DensityModulator final : public Modulator {
   explicit DensityModulator(const DensitySettings& settings)
       : settings_{settings}, dither_{settings.dither} {}
   Drive next(double command) noexcept SINERIG_NONBLOCKING override;
+  void take_back() noexcept SINERIG_NONBLOCKING override { state_ = before_; }
   Drive rest() noexcept override;
 
  private:
+  struct State {
+    double error = 0.0;
+    bool active = false;
+    std::uint32_t held = 0;  // ticks since the last decision; 0: decide
+  };
+
   DensitySettings settings_;
   Dither dither_;
-  double error_ = 0.0;
-  bool active_ = false;
-  std::uint32_t held_ = 0;  // ticks since the last decision; 0: decide
+  State state_;
+  State before_;
 };
 
 struct SignMagnitudeSettings {
@@ -84,18 +93,24 @@ class SignMagnitudeModulator final : public Modulator {
   explicit SignMagnitudeModulator(const SignMagnitudeSettings& settings)
       : settings_{settings}, dither_{settings.dither} {}
   Drive next(double command) noexcept SINERIG_NONBLOCKING override;
+  void take_back() noexcept SINERIG_NONBLOCKING override { state_ = before_; }
   Drive rest() noexcept override;
 
  private:
+  struct State {
+    double error = 0.0;
+    bool on = false;
+    bool negative = false;   // the direction line
+    std::uint32_t held = 0;  // ticks since the last decision; 0: decide
+    std::uint32_t pause_left = 0;
+  };
+
   void decide(double wanted) noexcept SINERIG_NONBLOCKING;
 
   SignMagnitudeSettings settings_;
   Dither dither_;
-  double error_ = 0.0;
-  bool on_ = false;
-  bool negative_ = false;   // the direction line
-  std::uint32_t held_ = 0;  // ticks since the last decision; 0: decide
-  std::uint32_t pause_left_ = 0;
+  State state_;
+  State before_;
 };
 
 struct StepSettings {
@@ -109,17 +124,23 @@ struct StepSettings {
 class StepModulator final : public Modulator {
  public:
   explicit StepModulator(const StepSettings& settings)
-      : settings_{settings}, since_step_{settings.min_ticks} {}
+      : settings_{settings}, state_{.since_step = settings.min_ticks}, before_{state_} {}
   Drive next(double command) noexcept SINERIG_NONBLOCKING override;
+  void take_back() noexcept SINERIG_NONBLOCKING override { state_ = before_; }
   Drive rest() noexcept override;
 
  private:
+  struct State {
+    std::int64_t steps = 0;
+    std::uint32_t since_step = 0;
+    bool negative = false;
+  };
+
   Drive drive(bool active) const noexcept SINERIG_NONBLOCKING;
 
   StepSettings settings_;
-  std::int64_t steps_ = 0;
-  std::uint32_t since_step_;
-  bool negative_ = false;
+  State state_;
+  State before_;
 };
 
 }  // namespace sinerig::gpio

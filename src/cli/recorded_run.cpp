@@ -1,25 +1,15 @@
 #include "cli/recorded_run.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <functional>
-#include <mutex>
-#include <thread>
 
 #include <spdlog/spdlog.h>
 
 #include "cli/found_modes.h"
-#include "cli/live_view.h"
+#include "cli/played_run.h"
 #include "cli/real_time.h"
 #include "cli/report_file.h"
-#include "cli/run_teller.h"
-#include "cli/service_notifier.h"
 #include "cli/stop_on_signal.h"
-#include "record/recorder.h"
-#include "report/remaining_time.h"
-#include "sweep/outbox.h"
-#include "sweep/runner.h"
 
 namespace sinerig::cli {
 
@@ -28,118 +18,6 @@ namespace {
 // Slots between the loop and the recorder: 4 s of samples at 10 kHz.
 constexpr std::size_t outbox_slots = 1U << 16U;
 constexpr std::size_t outbox_backlog = 1U << 14U;
-
-constexpr std::chrono::milliseconds progress_interval{50};
-
-// Beside the loop: a prior fitted, a file made, a report written. A large one takes a minute.
-constexpr std::chrono::minutes most_desk_work{10};
-
-// Points on their way from the recorder's thread to the one that prints.
-class PointInbox {
- public:
-  void put(const Record& record) {
-    if (const auto* point = std::get_if<Point>(&record)) {
-      const std::scoped_lock lock{mutex_};
-      points_.push_back(*point);
-    }
-  }
-  std::vector<Point> take() {
-    const std::scoped_lock lock{mutex_};
-    return std::exchange(points_, {});
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<Point> points_;
-};
-
-// Who hears of a run: the terminal, a script, the live page. Each may be absent.
-struct Audience {
-  RunTeller& teller;
-  ServiceNotifier& service;
-  std::function<void()> at_rest;  // the loop has ended, its last points are still to be written
-  LiveView* view;
-  record::Recorder::Samples samples;
-  double tick_s;                                // of a loop in real time; 0 in virtual time
-  std::chrono::duration<double> disk_patience;  // [output] max_lag_s
-};
-
-struct Played {
-  RunOutcome outcome;
-  std::string disk_failure;  // empty: everything is on the disk
-};
-
-// Whatever happens to those who watch: the loop ends, neutral, before what it works on is gone.
-class EndOfLoop {
- public:
-  EndOfLoop(realtime::LoopThread& loop, RunControl& control) : loop_{loop}, control_{control} {}
-  ~EndOfLoop() {
-    control_.stop_requests.store(2);
-    loop_.join();
-  }
-  EndOfLoop(const EndOfLoop&) = delete;
-  EndOfLoop& operator=(const EndOfLoop&) = delete;
-
- private:
-  realtime::LoopThread& loop_;
-  RunControl& control_;
-};
-
-// The loop on its own thread, its story told on this one, until both the loop and the recorder are
-// done.
-Played play(const SweepPlan& plan, realtime::LoopThread& loop, SweepRunner& runner,
-            RunControl& control, Outbox& outbox, record::SweepWriter& writer,
-            const Audience& audience) {
-  PointInbox inbox;
-  report::RemainingTime time{plan};
-  audience.service.ready();
-  const auto observe = [&](const Record& record) {
-    inbox.put(record);
-    if (audience.view != nullptr) audience.view->run().take(record);
-  };
-  record::Recorder recorder{outbox, writer, observe, audience.samples, audience.tick_s};
-  Played played;
-  std::atomic<bool> ended{false};
-  loop.start(
-      [&] {
-        played.outcome = runner.run(control);
-        ended.store(true);
-      },
-      [&] { outbox.close(); });
-  const EndOfLoop end_of_loop{loop, control};
-  const auto tell = [&] {
-    for (const Point& point : inbox.take()) audience.teller.point(point);
-    audience.teller.update(control.dwell.load(), control.tick.load());
-  };
-  const auto tell_service = [&] {
-    const std::uint32_t dwell = control.dwell.load();
-    const std::uint64_t tick = control.tick.load();
-    audience.service.progress(control.progress(), std::chrono::steady_clock::now());
-    time.update(dwell, tick);
-    audience.service.status(status_text(plan, dwell, time));
-  };
-  while (!ended.load()) {
-    tell();
-    tell_service();
-    std::this_thread::sleep_for(progress_interval);
-  }
-  tell_service();
-  audience.at_rest();
-  // Neutral, and no tick any more: the disk has the time that the rig gives it, and a little.
-  const auto patience =
-      std::chrono::duration_cast<std::chrono::nanoseconds>(audience.disk_patience);
-  try {
-    attended(audience.service, for_at_most(patience + most_desk_work), [&] {
-      loop.join();
-      recorder.finish();
-    });
-  } catch (const record::SweepFileError& error) {
-    played.disk_failure = error.what();
-  }
-  tell();
-  audience.teller.close();
-  return played;
-}
 
 const char* outcome_name(const RunOutcome& outcome) {
   if (!outcome.trip.tripped()) return "done";
@@ -342,6 +220,8 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
     at_rest();
   }
 
+  for (const Remark& remark : configured.remarks())
+    if (remark.doubts) spdlog::warn("{}", remark.text);
   RunEnd end{.outcome = played.disk_failure.empty() ? outcome_name(played.outcome) : "stopped",
              .reason = reason_of(played, outbox, configured),
              .sweep_file = writer->path(),

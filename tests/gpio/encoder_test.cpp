@@ -146,6 +146,21 @@ TEST(Lag, WaitsForEdgesThatAreStillOnTheirWay) {
   EXPECT_EQ(bench.encoder.late(), 1U);
 }
 
+TEST(Lag, ThatIsTooShortIsToldWithOneThatIsNot) {
+  EncoderSettings settings = plain;
+  settings.lag_ns = 100'000;
+  Bench bench{settings};
+  bench.read_at(1'000'000);
+  EXPECT_FALSE(bench.encoder.doubtful());
+  EXPECT_EQ(bench.encoder.seen(), "0 illegal transitions, 0 lost edges");
+  bench.lines.show_count(1, 600'000);
+  bench.read_at(2'000'000);
+  EXPECT_TRUE(bench.encoder.doubtful());
+  EXPECT_THAT(bench.encoder.seen(),
+              HasSubstr("1 edges later than lag_s = 0.0001 by up to 0.0003 s"));
+  EXPECT_THAT(bench.encoder.seen(), HasSubstr("lag_s = 0.0006 has room for them"));
+}
+
 TEST(EdgeSamples, AreStaleWithoutAnEdge) {
   EncoderSettings settings = plain;
   settings.samples = EncoderSettings::Samples::edge;

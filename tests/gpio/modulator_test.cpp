@@ -169,6 +169,29 @@ TEST(Step, DoesNotChatterBetweenTwoSteps) {
   for (int n = 0; n < 100; ++n) EXPECT_EQ(output.next(0.5).levels & 1U, 0U);
 }
 
+// A refused pulse is none: what is recorded as applied stays where the motor is.
+TEST(Step, IsNotCountedWhereTheLinesRefuseIt) {
+  for (int refused = 0; refused < 24; ++refused) {
+    StepModulator output{{.step = 1.0, .min_ticks = 2}};
+    std::uint32_t held = 0;
+    double motor = 0.0;
+    for (int n = 0; n < 50; ++n) {
+      const Drive drive = output.next(n < 12 ? 5.0 : -1.0);
+      if (n == refused || n == refused + 1) {
+        output.take_back();
+        continue;
+      }
+      if ((drive.levels & 1U) > (held & 1U)) {
+        ASSERT_EQ(drive.levels & 2U, held & 2U) << "the direction has to stand before the step";
+        motor += (drive.levels & 2U) != 0 ? -1.0 : 1.0;
+      }
+      held = drive.levels;
+      ASSERT_EQ(drive.applied, motor) << "refused at " << refused << ", tick " << n;
+    }
+    EXPECT_EQ(motor, -1.0) << refused;
+  }
+}
+
 TEST(Rest, LeavesTheLineInactive) {
   DensityModulator density{{.low = 0.0, .high = 1.0}};
   SignMagnitudeModulator drive{{.full = 1.0}};
