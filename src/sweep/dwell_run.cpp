@@ -18,9 +18,6 @@ constexpr std::uint64_t max_dwell_stretch = 4;
 // The transient of a dwell's beginning is not to be taken for a wrong sign of a read-back.
 constexpr std::uint32_t blocks_before_check = 2;
 
-// The power of the command at most, as a multiple of its tones', for a read-back to be judged.
-constexpr double most_slow = 1.2;
-
 }  // namespace
 
 DwellRun::DwellRun(const SweepPlan& plan, const RunnerSettings& settings, std::size_t sensors,
@@ -33,18 +30,15 @@ DwellRun::DwellRun(const SweepPlan& plan, const RunnerSettings& settings, std::s
       measurement_{1 + sensors,        plan.most_bins(), plan.most_tones(),
                    settings.responses, plan.judgement,   plan.rate_hz},
       commanded_{plan.most_tones()},
-      range_faults_(sensors) {}
+      range_faults_(sensors),
+      follows_(settings.readbacks.size()) {}
 
 void DwellRun::CommandedBlock::add(const Excitation& excitation, bool begins) noexcept {
   const double baseline = excitation.baseline();
   if (begins) {
     std::fill(leaked_.begin(), leaked_.end(), std::complex<double>{});
-    sum_ = square_ = 0.0;
     first_ = baseline;
   }
-  const double command = excitation.command() - first_;
-  sum_ += command;
-  square_ += command * command;
   const double moved = baseline - first_;
   if (moved == 0.0) return;
   const auto phasors = excitation.phasors();
@@ -104,16 +98,23 @@ void DwellRun::measure(std::uint64_t tick, std::span<const Observation> observat
     if (blocks_ < blocks_before_check) commanded_.add(excitation_, measurement_.block_begins());
     if (measurement_.block_ended()) {
       put_block(tick, observations.size());
-      if (blocks_ <= blocks_before_check) check_excitation(tick, observations[0].offset_ns);
+      if (blocks_ <= blocks_before_check) check_applied(tick, observations[0].offset_ns);
+      if (blocks_ == blocks_before_check) check_readbacks(tick);
     }
   }
-  given_up_ = ticks_ >= most_ticks_;
+  given_up_ = ticks_ >= most_ticks_ && !measurement_.done();
+}
+
+bool DwellRun::readbacks_seen() const noexcept {
+  return blocks_ >= blocks_before_check ||
+         std::find(follows_.begin(), follows_.end(), false) == follows_.end();
 }
 
 void DwellRun::put_block(std::uint64_t tick, std::size_t channels) noexcept {
   const Dwell& dwell = *dwell_;
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
     for (std::size_t channel = 0; channel < channels; ++channel) {
+      if (!measurement_.block_complete(channel)) continue;
       sink_.put(Block{.dwell = index_,
                       .attempt = attempt_,
                       .block = blocks_,
@@ -126,46 +127,46 @@ void DwellRun::put_block(std::uint64_t tick, std::size_t channels) noexcept {
   ++blocks_;
 }
 
-void DwellRun::check_excitation(std::uint64_t tick, std::int64_t applied_offset_ns) noexcept {
+void DwellRun::refuse(const ExcitationVerdict& verdict, std::uint32_t sensor,
+                      std::uint64_t tick) noexcept {
   constexpr TripCause causes[] = {TripCause::none, TripCause::excitation_missing,
                                   TripCause::excitation_other_frequency,
                                   TripCause::excitation_reversed};
-  const auto refuse = [&](const ExcitationVerdict& verdict, std::uint32_t sensor) {
-    if (verdict.fault == ExcitationFault::none) return;
-    guard_.trip(causes[static_cast<std::size_t>(verdict.fault)], sensor, verdict.value,
-                verdict.limit, tick);
-  };
-  const Dwell& dwell = *dwell_;
-  const std::size_t tones = dwell.tones.size();
-  const auto length = static_cast<double>(dwell.block_samples);
-  const auto commanded = [&](std::size_t tone) {
-    return excitation_.commanded(tone) + commanded_.leaked(tone, length);
-  };
-  for (std::size_t tone = 0; tone < tones; ++tone) {
+  if (verdict.fault == ExcitationFault::none) return;
+  guard_.trip(causes[static_cast<std::size_t>(verdict.fault)], sensor, verdict.value, verdict.limit,
+              tick);
+}
+
+std::complex<double> DwellRun::commanded(std::size_t tone) const noexcept {
+  return excitation_.commanded(tone) +
+         commanded_.leaked(tone, static_cast<double>(dwell_->block_samples));
+}
+
+void DwellRun::check_applied(std::uint64_t tick, std::int64_t offset_ns) noexcept {
+  if (!measurement_.block_complete(0)) return;
+  for (std::size_t tone = 0; tone < dwell_->tones.size(); ++tone) {
     // What a bus reports a tick later was applied at the time that it says.
     const double angle_rad = 2.0e-9 * std::numbers::pi *
-                             dwell.tone_hz(dwell.tones[tone], rate_hz_) *
-                             static_cast<double>(applied_offset_ns);
-    refuse(check_applied(
+                             dwell_->tone_hz(dwell_->tones[tone], rate_hz_) *
+                             static_cast<double>(offset_ns);
+    refuse(sinerig::check_applied(
                measurement_.block_coefficients(0, tone).phasor() * std::polar(1.0, -angle_rad),
                commanded(tone), settings_.min_excitation),
-           no_sensor);
+           no_sensor, tick);
   }
-  if (blocks_ < blocks_before_check) return;
-  double tones_power = 0.0;
-  for (std::size_t tone = 0; tone < tones; ++tone) tones_power += 0.5 * std::norm(commanded(tone));
-  // The slow part of the command is no foreign signal. Where it is more than a little, a block says
-  // nothing of a read-back behind a plant of its own.
-  const double all = commanded_.power(length) / tones_power;
-  if (all > most_slow) return;
-  for (const std::size_t sensor : settings_.readbacks) {
-    double tone_power = 0.0;
-    for (std::size_t tone = 0; tone < tones; ++tone) {
-      tone_power += 0.5 * std::norm(measurement_.block_coefficients(1 + sensor, tone).phasor());
-    }
-    refuse(check_readback(measurement_.block_coefficients(1 + sensor, 0).phasor(), commanded(0),
-                          tone_power * all, measurement_.block_power(1 + sensor)),
-           static_cast<std::uint32_t>(sensor));
+}
+
+// Once it has followed, a read-back may lag as it will: what is behind a drive turns at high
+// frequencies. But it has to go on showing the tones.
+void DwellRun::check_readbacks(std::uint64_t tick) noexcept {
+  for (std::size_t i = 0; i < settings_.readbacks.size(); ++i) {
+    const std::size_t sensor = settings_.readbacks[i];
+    const std::optional<ChannelContent> found = measurement_.block_content(1 + sensor);
+    if (!found) continue;
+    const ExcitationVerdict verdict =
+        check_readback(*found, excitation_.commanded(0), !follows_[i]);
+    refuse(verdict, static_cast<std::uint32_t>(sensor), tick);
+    follows_[i] = follows_[i] || verdict.fault == ExcitationFault::none;
   }
 }
 

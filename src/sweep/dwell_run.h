@@ -10,6 +10,7 @@
 
 #include "sweep/clock.h"
 #include "sweep/excitation.h"
+#include "sweep/excitation_check.h"
 #include "sweep/guard.h"
 #include "sweep/measurement.h"
 #include "sweep/plan.h"
@@ -40,8 +41,10 @@ class DwellRun {
   void measure(std::uint64_t tick, std::span<const Observation> observations,
                bool disturbed) noexcept SINERIG_NONBLOCKING;
 
-  // Measured as far as it will be.
-  bool over() const noexcept { return measurement_.done() || given_up_; }
+  // Measured as far as it will be; but the first dwells go on until a read-back can be judged.
+  bool over() const noexcept {
+    return given_up_ || (measurement_.done() && (readbacks_seen() || ticks_ >= most_ticks_));
+  }
 
   // Takes the judgement as it stands, for the end or a stop in the midst of it.
   void conclude() noexcept SINERIG_NONBLOCKING { measurement_.conclude(); }
@@ -73,20 +76,18 @@ class DwellRun {
     std::complex<double> leaked(std::size_t tone, double length) const noexcept {
       return 2.0 / length * leaked_[tone];
     }
-    // About its mean, slow part included.
-    double power(double length) const noexcept {
-      return std::max(0.0, square_ / length - sum_ * sum_ / (length * length));
-    }
 
    private:
     std::vector<std::complex<double>> leaked_;
     double first_ = 0.0;  // baseline at its beginning: what all is counted from
-    double sum_ = 0.0;
-    double square_ = 0.0;
   };
 
   void put_block(std::uint64_t tick, std::size_t channels) noexcept;
-  void check_excitation(std::uint64_t tick, std::int64_t applied_offset_ns) noexcept;
+  void check_applied(std::uint64_t tick, std::int64_t offset_ns) noexcept;
+  void check_readbacks(std::uint64_t tick) noexcept;
+  void refuse(const ExcitationVerdict& verdict, std::uint32_t sensor, std::uint64_t tick) noexcept;
+  std::complex<double> commanded(std::size_t tone) const noexcept;
+  bool readbacks_seen() const noexcept;
 
   double rate_hz_;
   const RunnerSettings& settings_;
@@ -96,6 +97,7 @@ class DwellRun {
   Measurement measurement_;
   CommandedBlock commanded_;
   std::vector<std::uint64_t> range_faults_;  // per sensor
+  std::vector<bool> follows_;                // per read-back: it did once in this sweep
 
   const Dwell* dwell_ = nullptr;
   std::uint32_t index_ = 0;

@@ -89,7 +89,9 @@ bool WindowEstimator::solve(const Regression& regression, const Window& window, 
   const std::size_t order = regression.order();
   load(regression, window, window.first, window.last, channel, 0.0, solution.sums);
   if (solution.sums.count <= static_cast<double>(order)) return false;
-  if (!solution.solver.factor(solution.sums.gram, order)) return false;
+  // A sensor slower than the loop may see a harmonic as the tone, or as another harmonic.
+  if (!solution.solver.factor(solution.sums.gram, order, Regression::cosine_row(tones_)))
+    return false;
   std::copy_n(solution.sums.moments.begin(), order, solution.beta.begin());
   solution.solver.solve(std::span{solution.beta}.first(order));
   solution.slope = solution.beta[Regression::drift_row];
@@ -133,16 +135,29 @@ bool WindowEstimator::estimate(const Regression& regression, const Window& windo
   return true;
 }
 
+std::optional<ChannelContent> WindowEstimator::content(const Regression& regression,
+                                                       const Window& window, std::size_t channel,
+                                                       std::size_t tones,
+                                                       std::size_t harmonics) noexcept {
+  tones_ = tones;
+  if (!solve(regression, window, channel, input_)) return std::nullopt;
+  ChannelContent content{.first_tone = phasor_of(input_.beta, 0)};
+  for (std::size_t bin = 0; bin < tones; ++bin) {
+    content.tone_power += 0.5 * std::norm(phasor_of(input_.beta, bin));
+  }
+  content.foreign_power = input_.residual_square / input_.sums.count;
+  for (std::size_t bin = tones; bin < tones + harmonics; ++bin) {
+    content.foreign_power += 0.5 * std::norm(phasor_of(input_.beta, bin));
+  }
+  return content;
+}
+
 bool WindowEstimator::is_sinusoidal(const Regression& regression, const Window& window,
                                     std::size_t channel, std::size_t tones,
                                     std::size_t harmonics) noexcept {
   constexpr double negligible = 1e-12;  // as a part of the power
-  if (!solve(regression, window, channel, input_)) return true;
-  double foreign = input_.residual_square / input_.sums.count;
-  for (std::size_t bin = tones; bin < tones + harmonics; ++bin) {
-    foreign += 0.5 * std::norm(phasor_of(input_.beta, bin));
-  }
-  return foreign <= negligible * input_.sums.square / input_.sums.count;
+  const auto found = content(regression, window, channel, tones, harmonics);
+  return !found || found->foreign_power <= negligible * input_.sums.square / input_.sums.count;
 }
 
 void WindowEstimator::take_distortion(const Pair& pair, std::size_t order,

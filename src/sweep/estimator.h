@@ -4,6 +4,7 @@
 #pragma once
 
 #include <complex>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -14,6 +15,13 @@
 #include "sweep/stray.h"
 
 namespace sinerig {
+
+// What one channel holds over a window, beside a constant, a drift and a bias motion.
+struct ChannelContent {
+  std::complex<double> first_tone;  // b + j a, at the tick
+  double tone_power = 0.0;          // all tones
+  double foreign_power = 0.0;       // their harmonics and the rest
+};
 
 class WindowEstimator {
  public:
@@ -27,6 +35,11 @@ class WindowEstimator {
 
   // Of the estimate that failed: the input holds nothing at all.
   bool input_silent() const noexcept { return input_silent_; }
+
+  // Lost samples are left out; nothing where too few are there. `harmonics` bins follow the tones.
+  std::optional<ChannelContent> content(const Regression& regression, const Window& window,
+                                        std::size_t channel, std::size_t tones,
+                                        std::size_t harmonics) noexcept SINERIG_NONBLOCKING;
 
   // Whether a channel is its tones alone over the window, on a constant or a bias motion, within a
   // millionth.

@@ -32,14 +32,15 @@ ExcitationVerdict check_applied(std::complex<double> measured, std::complex<doub
   return check_sign(measured, commanded);
 }
 
-ExcitationVerdict check_readback(std::complex<double> measured, std::complex<double> commanded,
-                                 double tone_power, double total_power) noexcept {
-  if (!(total_power > 0.0)) return {.fault = ExcitationFault::missing, .value = 0.0, .limit = 0.0};
-  const double part = tone_power / total_power;
+ExcitationVerdict check_readback(const ChannelContent& measured, std::complex<double> commanded,
+                                 bool and_sign) noexcept {
+  const double total = measured.tone_power + measured.foreign_power;
+  if (!(total > 0.0)) return {.fault = ExcitationFault::missing, .value = 0.0, .limit = 0.0};
+  const double part = measured.tone_power / total;
   if (part < least_tone_part) {
     return {.fault = ExcitationFault::other_frequency, .value = part, .limit = least_tone_part};
   }
-  return check_sign(measured, commanded);
+  return and_sign ? check_sign(measured.first_tone, commanded) : ExcitationVerdict{};
 }
 
 }  // namespace sinerig

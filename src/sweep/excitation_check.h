@@ -5,8 +5,8 @@
 #include <complex>
 #include <cstdint>
 
+#include "sweep/estimator.h"
 #include "sweep/nonblocking.h"
-#include "sweep/regression.h"
 
 namespace sinerig {
 
@@ -27,10 +27,9 @@ struct ExcitationVerdict {
 ExcitationVerdict check_applied(std::complex<double> measured, std::complex<double> commanded,
                                 double min_excitation) noexcept SINERIG_NONBLOCKING;
 
-// A sensor that reads the excitation back in a unit of its own: `tone_power` of `total_power` (both
-// without the mean) is at the commanded frequencies.
-ExcitationVerdict check_readback(std::complex<double> measured, std::complex<double> commanded,
-                                 double tone_power,
-                                 double total_power) noexcept SINERIG_NONBLOCKING;
+// A sensor that reads the excitation back in a unit of its own; its sign is judged where
+// `and_sign`.
+ExcitationVerdict check_readback(const ChannelContent& measured, std::complex<double> commanded,
+                                 bool and_sign) noexcept SINERIG_NONBLOCKING;
 
 }  // namespace sinerig

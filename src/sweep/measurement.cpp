@@ -47,6 +47,7 @@ Measurement::Measurement(std::size_t channels, std::size_t max_bins, std::size_t
       strays_(max_tones),
       transients_(pairs_.size()),
       omega_(max_bins),
+      block_missing_(channels),
       modelled_(pairs_.size()) {
   if (judgement_.settling != Settling::model) return;
   modal_ = std::make_unique<ModalDwell>(channels, outputs_of(pairs_), rate_hz);
@@ -83,8 +84,8 @@ void Measurement::restart() noexcept {
   next_look_ = 0;
   first_ = 0;
   stride_ = 1;
-  block_complete_ = true;
   block_ended_ = false;
+  std::fill(block_missing_.begin(), block_missing_.end(), 0);
   std::fill(results_.begin(), results_.end(),
             Result{.still = judgement_.settling == Settling::fixed});
   whole_blocks_ = judgement_.settling == Settling::fixed;
@@ -134,12 +135,14 @@ void Measurement::add(std::span<const Phasor> phasors,
                       std::span<const Observation> observations) noexcept {
   if (block_ended_) {
     block_ended_ = false;
-    block_complete_ = true;
+    std::fill(block_missing_.begin(), block_missing_.end(), 0);
     regression_.begin_block();
   }
   begins_ = in_block_ == 0;
   regression_.add(phasors, observations);
-  for (const Observation& each : observations) block_complete_ = block_complete_ && !each.missing;
+  for (std::size_t channel = 0; channel < observations.size(); ++channel) {
+    if (observations[channel].missing) ++block_missing_[channel];
+  }
   ++samples_;
   ++in_block_;
   // Part k of a block ends at the sample nearest below (k + 1) / parts of it.
@@ -224,14 +227,22 @@ void Measurement::end_part() noexcept {
   if (in_block_ == dwell_->block_samples) {
     part_ = 0;
     in_block_ = 0;
-    block_ended_ = block_complete_;
-    if (!block_complete_) {
-      block_complete_ = true;
-      regression_.begin_block();
-    }
+    block_ended_ = true;
   }
-  if (kept) judge();
+  if (kept && !done_) judge();
   if (samples_ + dwell_->settle_samples >= dwell_->max_samples && !done_) at_limit_ = true;
+}
+
+std::optional<ChannelContent> Measurement::block_content(std::size_t channel) noexcept {
+  const std::size_t last = regression_.checkpoints() - 1;
+  const std::size_t per_block = dwell_->parts / regression_.stride();
+  if (per_block == 0 || last < per_block) return std::nullopt;
+  auto found = estimator_.content(regression_, {.first = last - per_block, .last = last}, channel,
+                                  dwell_->tones.size(), dwell_->harmonic_bins());
+  if (!found) return std::nullopt;
+  const auto offset_ns = static_cast<double>(regression_.common_offset_ns(channel));
+  found->first_tone *= std::polar(1.0, -omega_[0] * offset_ns * 1e-9);
+  return found;
 }
 
 void Measurement::conclude() noexcept {

@@ -64,16 +64,18 @@ class Measurement {
 
   // The last add() was the first of a block.
   bool block_begins() const noexcept { return begins_; }
-  // A complete block of whole cycles has ended with the last add(); its plain sums.
+  // A block of whole cycles has ended with the last add(); its plain sums, where no sample of the
+  // channel is missing.
   bool block_ended() const noexcept { return block_ended_; }
+  bool block_complete(std::size_t channel) const noexcept { return block_missing_[channel] == 0; }
   Coefficients block_coefficients(std::size_t channel, std::size_t tone) const noexcept {
     return regression_.block_coefficients(channel, tone,
                                           static_cast<double>(dwell_->block_samples));
   }
 
-  double block_power(std::size_t channel) const noexcept {
-    return regression_.block_power(channel, static_cast<double>(dwell_->block_samples));
-  }
+  // What the block holds of a channel, whatever is missing of it, referred to the true time of its
+  // samples. Nothing where too little is there.
+  std::optional<ChannelContent> block_content(std::size_t channel) noexcept SINERIG_NONBLOCKING;
 
   // Takes the judgement as it stands, for the end of the dwell or a stop in the midst of it.
   void conclude() noexcept SINERIG_NONBLOCKING;
@@ -129,6 +131,7 @@ class Measurement {
   bool evaluate(std::size_t pair, const Window& window) noexcept;
   bool still(const Window& window) noexcept;
   void look_for_transient(std::size_t pair, const Window& window) noexcept;
+  bool may_ring() const noexcept;
   bool target_met(std::size_t pair, bool as_it_is = false) const noexcept;
   double settling_tolerance() const noexcept;
   std::size_t parts_per_block() const noexcept;
@@ -145,12 +148,13 @@ class Measurement {
   std::size_t max_tones_;
   Regression regression_;
   WindowEstimator estimator_;
-  std::vector<NoiseMemory> memories_;        // per pair
-  std::vector<Result> results_;              // per pair and tone
-  std::vector<Estimate> estimates_;          // of the window under evaluation
-  std::vector<Stray> strays_;                // per tone
-  std::vector<TransientMemory> transients_;  // per pair
-  std::vector<double> omega_;                // per bin
+  std::vector<NoiseMemory> memories_;         // per pair
+  std::vector<Result> results_;               // per pair and tone
+  std::vector<Estimate> estimates_;           // of the window under evaluation
+  std::vector<Stray> strays_;                 // per tone
+  std::vector<TransientMemory> transients_;   // per pair
+  std::vector<double> omega_;                 // per bin
+  std::vector<std::uint64_t> block_missing_;  // per channel
 
   std::unique_ptr<ModalDwell> modal_;  // where transients are modelled
   bool by_model_ = false;              // the model of its transient ended this dwell
@@ -170,7 +174,6 @@ class Measurement {
   // What was applied has harmonics that the regression does not model (a clamped or a coarse
   // command): they are orthogonal to the tone over whole blocks only.
   bool whole_blocks_ = false;
-  bool block_complete_ = true;
   bool block_ended_ = false;
   bool begins_ = false;
   bool done_ = false;

@@ -44,6 +44,9 @@ constexpr double hidden_part = 0.5;
 constexpr std::size_t blocks_that_know_noise = 6;
 constexpr double noise_growth = 1.5;
 
+// Windows of fewer can't tell harmonics from a ringing transient.
+constexpr std::uint64_t blocks_that_know_harmonics = 2;
+
 // The colour of the noise counts in the judgement of a shift once more degrees of freedom than
 // these are behind it; a transient colours the residual too.
 constexpr double colour_dof = 10.0;
@@ -160,6 +163,15 @@ bool Measurement::still(const Window& window) noexcept {
   return all;
 }
 
+// Harmonics take in a ringing transient that is near them, and what they take no residual shows.
+bool Measurement::may_ring() const noexcept {
+  for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
+    const Result& first = result(pair, 0);
+    if (first.known && first.estimate.distortion > settling_tolerance()) return true;
+  }
+  return false;
+}
+
 // Whether the dwell may end here: by the variance that was expected before the window was seen,
 // where that is more. At its end `as_it_is`: what the point says of itself.
 bool Measurement::target_met(std::size_t pair, bool as_it_is) const noexcept {
@@ -201,6 +213,10 @@ void Measurement::judge() noexcept {
     return;
   }
   const bool settling_is_fixed = judgement_.settling == Settling::fixed;
+  if (!settling_is_fixed && length < blocks_that_know_harmonics * dwell_->block_samples &&
+      may_ring()) {
+    return;
+  }
   for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
     if (pair > 0 && settling_is_fixed && !evaluate(pair, window)) continue;
     if (!target_met(pair)) return;

@@ -1,5 +1,6 @@
 #include "sweep/normal_equations.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace sinerig {
@@ -14,7 +15,8 @@ constexpr double smallest_pivot = 1e-11;
 NormalSolver::NormalSolver(std::size_t max_order)
     : factor_(triangle(max_order)), scale_(max_order) {}
 
-bool NormalSolver::factor(std::span<const double> gram, std::size_t order) noexcept {
+bool NormalSolver::factor(std::span<const double> gram, std::size_t order,
+                          std::size_t needed) noexcept {
   order_ = order;
   for (std::size_t i = 0; i < order; ++i) {
     const double diagonal = gram[triangle(i) + i];
@@ -28,9 +30,13 @@ bool NormalSolver::factor(std::span<const double> gram, std::size_t order) noexc
       double sum = gram[triangle(i) + j] * scale_[i] * scale_[j];
       for (std::size_t k = 0; k < j; ++k) sum -= row_i[k] * row_j[k];
       if (i == j) {
-        const bool absent = scale_[i] == 0.0;
-        if (!absent && !(sum > smallest_pivot)) return false;
-        row_i[i] = absent ? 1.0 : std::sqrt(sum);
+        const bool determined = scale_[i] != 0.0 && !(sum > smallest_pivot);
+        if (determined && i < needed) return false;
+        if (determined) {
+          scale_[i] = 0.0;
+          std::fill_n(row_i, i, 0.0);
+        }
+        row_i[i] = scale_[i] == 0.0 ? 1.0 : std::sqrt(sum);
       } else {
         row_i[j] = sum / row_j[j];
       }

@@ -31,9 +31,13 @@ class NormalSolver {
   explicit NormalSolver(std::size_t max_order);
 
   // Factors the Gram matrix, columns scaled. A regressor that was zero throughout is absent: its
-  // coefficient is zero. False where the window does not determine the
-  // regressors (a pivot below 1e-11 of its diagonal).
-  bool factor(std::span<const double> gram, std::size_t order) noexcept SINERIG_NONBLOCKING;
+  // coefficient is zero. So is one that those before it determine (a pivot below 1e-11 of its
+  // diagonal), from row `needed` on; false where it is one of the rows before.
+  bool factor(std::span<const double> gram, std::size_t order,
+              std::size_t needed) noexcept SINERIG_NONBLOCKING;
+  bool factor(std::span<const double> gram, std::size_t order) noexcept SINERIG_NONBLOCKING {
+    return factor(gram, order, order);
+  }
 
   // x := G⁻¹ x with the last factor.
   void solve(std::span<double> x) const noexcept SINERIG_NONBLOCKING;

@@ -137,13 +137,6 @@ Coefficients Regression::block_coefficients(std::size_t channel, std::size_t bin
           .mean = states_[channel].reference + sum(constant_row) / samples};
 }
 
-double Regression::block_power(std::size_t channel, double samples) const noexcept {
-  const double* from = &block_start_[channel * (order() + 1)];
-  const double* to = &totals_[moments_at(channel)];
-  const double mean = (to[constant_row] - from[constant_row]) / samples;
-  return (to[order()] - from[order()]) / samples - mean * mean;
-}
-
 bool Regression::checkpoint() noexcept {
   part_gram_.end_part(static_cast<double>(part_start_) * drift_scale_,
                       {totals_.data(), triangle(order())});

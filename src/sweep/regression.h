@@ -74,8 +74,6 @@ class Regression {
   void begin_block() noexcept SINERIG_NONBLOCKING;
   Coefficients block_coefficients(std::size_t channel, std::size_t bin,
                                   double samples) const noexcept SINERIG_NONBLOCKING;
-  // Mean square of a channel in the block, its mean taken out.
-  double block_power(std::size_t channel, double samples) const noexcept SINERIG_NONBLOCKING;
 
   // Ends a part. Keeps the totals up to here, or every stride()-th time only: when the memory is
   // full every second checkpoint goes and the stride doubles. True when a checkpoint was kept.

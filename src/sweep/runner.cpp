@@ -153,7 +153,7 @@ bool SweepRunner::step(RunControl& control) noexcept {
     if (!excitation_.fading() && review_.ready()) hear_review();
   } else {
     run_.measure(tick.index, observations_, disturbed);
-    if (run_.over()) conclude_dwell();
+    if (run_.over() && !guard_.trip().tripped()) conclude_dwell();
   }
   if (!sink_.flush()) guard_.stop(TripCause::recorder_stalled, tick.index);
   return keep_going();
@@ -222,8 +222,12 @@ bool SweepRunner::applied_late(std::int64_t offset_ns) noexcept {
 void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
                               std::uint64_t tick) noexcept {
   if (sample.fault == Fault::range) run_.note_range_fault(sensor);
-  const bool was_good = sensor_faults_[sensor] == Fault::none;
-  const bool is_good = sample.fault == Fault::none;
+  // A sensor slower than the loop is stale in every other tick: its age is what is watched.
+  const auto good = [](Fault fault) {
+    return fault == Fault::none || fault == Fault::stale;
+  };
+  const bool was_good = good(sensor_faults_[sensor]);
+  const bool is_good = good(sample.fault);
   if (was_good != is_good) {
     announce({.kind = is_good ? EventKind::sensor_recovered : EventKind::sensor_fault,
               .fault = sample.fault,

@@ -80,6 +80,61 @@ TEST(ExcitationCheck, FindsAReadBackThatDoesNotMove) {
   EXPECT_EQ(run.outcome.trip.cause, TripCause::excitation_missing);
 }
 
+// An encoder that is late now and then is no reason not to look at what was applied.
+TEST(ExcitationCheck, FindsASwappedWireBesideASensorThatMissesSamples) {
+  const SweepPlan plan = ten_points();
+  auto rig = lag();
+  rig.actuator.gain = -1.0;
+  rig.sensors[0].imperfections.lost_fraction = 0.3;
+  const auto run = test::run_virtual(plan, rig);
+  EXPECT_EQ(run.outcome.trip.cause, TripCause::excitation_reversed);
+  EXPECT_LE(run.outcome.trip.tick, ticks_of_two_blocks(plan));
+}
+
+TEST(ExcitationCheck, JudgesAReadBackThatMissesSamples) {
+  const SweepPlan plan = ten_points();
+  auto rig = lag();
+  rig.sensors[0].imperfections.lost_fraction = 0.3;
+  auto run = test::run_virtual(plan, rig, test::open_guard(1), reading_back());
+  EXPECT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"gyro"});
+  rig.system = sim::from_transfer_function({-100.0}, {1.0, 100.0});
+  run = test::run_virtual(plan, rig, test::open_guard(1), reading_back());
+  EXPECT_EQ(run.outcome.trip.cause, TripCause::excitation_reversed);
+  EXPECT_LE(run.outcome.trip.tick, ticks_of_two_blocks(plan));
+}
+
+// Dwells of one block, as they are by default, and those that a model ends in less.
+TEST(ExcitationCheck, FindsAReversedReadBackHoweverShortTheDwells) {
+  for (const Settling settling : {Settling::fixed, Settling::detect, Settling::model}) {
+    SweepSettings sweep;
+    sweep.start_hz = 1.0;
+    sweep.stop_hz = 5.0;
+    sweep.points = 5;
+    sweep.amplitude = 0.5;
+    sweep.settling = settling;
+    auto rig = lag();
+    rig.system = sim::from_transfer_function({-100.0}, {1.0, 100.0});
+    const auto run =
+        test::run_virtual(plan_sweep(sweep, {}, rate_hz), rig, test::open_guard(1), reading_back());
+    EXPECT_EQ(run.outcome.trip.cause, TripCause::excitation_reversed) << static_cast<int>(settling);
+    EXPECT_EQ(run.outcome.dwells_done, 0U) << static_cast<int>(settling);
+    ASSERT_EQ(run.sink.points.size(), 1U) << static_cast<int>(settling);
+    EXPECT_EQ(run.sink.points[0].status, PointStatus::stopped) << static_cast<int>(settling);
+  }
+}
+
+// Its stamps say how late it is, and what is behind a drive may turn by more once it has followed.
+TEST(ExcitationCheck, IsContentWithAReadBackThatComesLate) {
+  auto rig = lag();
+  rig.sensors[0].imperfections.delay_s = 0.004;
+  auto run = test::run_virtual(ten_points(), rig, test::open_guard(1), reading_back());
+  EXPECT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"gyro"});
+  rig = lag();
+  rig.system = sim::from_transfer_function({1e6}, {1.0, 200.0, 2e4, 1e6});
+  run = test::run_virtual(ten_points(), rig, test::open_guard(1), reading_back());
+  EXPECT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"gyro"});
+}
+
 TEST(ExcitationCheck, IsContentWithAReadBackThatFollows) {
   const auto run = test::run_virtual(ten_points(), lag(), test::open_guard(1), reading_back());
   EXPECT_FALSE(run.outcome.trip.tripped()) << describe(run.outcome.trip, {"gyro"});

@@ -157,6 +157,47 @@ TEST(LostSamples, NeverMakeTheCommandJumpEither) {
   }
 }
 
+// One sample in ten ticks: at 20 Hz and above its harmonics and the tone look alike to it.
+TEST(LostSamples, OfASlowSensorCostNoPointAndNoEvents) {
+  SweepSettings sweep;
+  sweep.spacing = Spacing::list;
+  sweep.frequencies_hz = {7.0, 20.0, 25.0, 30.0, 40.0};
+  sweep.amplitude = 0.7;
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  test::ScriptedClock clock{rate_hz};
+  test::FakeActuator actuator{clock};
+  double state = 0.0;
+  actuator.apply = [&](double command) {
+    state = 0.95 * state + 0.05 * command;
+    return command;
+  };
+  test::FakeSensor sensor{clock, [&](std::uint64_t tick) {
+                            return state + 1e-5 * static_cast<double>(tick * 7919 % 101);
+                          }};
+  sensor.fault_at = [](std::uint64_t tick) {
+    return tick % 10 == 0 ? Fault::none : Fault::stale;
+  };
+  Sensor* const sensors[] = {&sensor};
+  test::CollectingSink sink;
+  Guard guard{test::open_guard(1), clock.grid().period_s()};
+  SweepRunner runner{plan, {}, clock, actuator, sensors, guard, sink};
+  RunControl control;
+  const RunOutcome outcome = runner.run(control);
+  EXPECT_FALSE(outcome.trip.tripped());
+  ASSERT_EQ(sink.points.size(), 5U);
+  for (const Point& point : sink.points) {
+    const std::complex<double> z =
+        std::polar(1.0, 2.0 * std::numbers::pi * point.frequency_hz / rate_hz);
+    EXPECT_EQ(point.status, PointStatus::good) << point.frequency_hz;
+    EXPECT_NEAR(std::abs(point.response * (1.0 - 0.95 / z) / 0.05), 1.0, 0.02)
+        << point.frequency_hz;
+  }
+  for (const Event& event : sink.events) {
+    EXPECT_NE(event.kind, EventKind::sensor_fault);
+    EXPECT_NE(event.kind, EventKind::sensor_recovered);
+  }
+}
+
 TEST(Gaps, BetweenTwoDwellsAreHandledToo) {
   const SweepPlan plan = plan_of({10.0, 20.0});
   const std::uint64_t second = plan.dwells[0].min_samples();

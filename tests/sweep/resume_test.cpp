@@ -113,7 +113,7 @@ TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Dwells, GoingOn, testing::Values(0U, 1U, 2U, 7U, 12U, 13U));
+INSTANTIATE_TEST_SUITE_P(Dwells, GoingOn, testing::Values(0U, 1U, 3U, 7U, 12U, 13U));
 
 TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   const SweepPlan plan = levelled_plan();

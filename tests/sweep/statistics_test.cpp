@@ -126,6 +126,42 @@ TEST(Statistics, ALightlyDampedModeIsWaitedFor) {
   }
 }
 
+// Within a cycle or two the second and the third harmonic of 9.7 Hz take in a mode at 23 Hz, and no
+// residual shows it.
+TEST(Statistics, ARingingModeIsNotTakenForHarmonics) {
+  SweepSettings sweep;
+  sweep.start_hz = 0.5;
+  sweep.stop_hz = 50.0;
+  sweep.points = 60;
+  sweep.amplitude = 0.7;
+  const SweepPlan plan = plan_sweep(sweep, {}, rate_hz);
+  constexpr double twice_target_db = 0.1;
+  constexpr double twice_target_deg = 0.6;
+  int beyond = 0;
+  for (const double damping : {0.01, 0.05}) {
+    const double natural_rad_s = 2.0 * std::numbers::pi * 23.0;
+    const std::complex<double> mode{-damping * natural_rad_s,
+                                    natural_rad_s * std::sqrt(1.0 - damping * damping)};
+    const auto modes = test::partial_fractions({}, {Complex{mode}, Complex{std::conj(mode)}},
+                                               static_cast<long double>(std::norm(mode)));
+    for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+      auto rig = rig_of(seed);
+      rig.system = sim::from_zeros_poles({}, {mode}, std::norm(mode));
+      rig.sensors[0].imperfections.noise_rms = 1e-3;
+      for (const Point& point : test::run_virtual(plan, rig).sink.points) {
+        if (point.status != PointStatus::good) continue;
+        const std::complex<double> exact{test::held_response(
+            modes, two_pi * static_cast<long double>(point.frequency_hz), 1.0L / rate_hz)};
+        const std::complex<double> off = point.response / exact;
+        const bool far = std::abs(20.0 * std::log10(std::abs(off))) > twice_target_db ||
+                         std::abs(std::arg(off)) * 180.0 / std::numbers::pi > twice_target_deg;
+        if (far) ++beyond;
+      }
+    }
+  }
+  EXPECT_EQ(beyond, 0) << "of 2400 points, the default target 0.05 dB and 0.3 degrees";
+}
+
 TEST(Statistics, TheModeOfASecondResponseIsWaitedFor) {
   SweepSettings sweep = ten_points();
   sweep.spacing = Spacing::list;
