@@ -48,12 +48,12 @@ void DwellRun::CommandedBlock::add(const Excitation& excitation, bool begins) no
 }
 
 void DwellRun::begin(const Dwell& dwell, std::uint32_t index, std::uint32_t attempt, double scale,
-                     std::uint64_t tick, bool by_detection) noexcept {
+                     std::uint64_t tick, const Beginning& beginning) noexcept {
   dwell_ = &dwell;
   index_ = index;
   attempt_ = attempt;
   scale_ = scale;
-  measurement_.start(dwell, by_detection);
+  measurement_.start(dwell, beginning);
   // A change of amplitude that the plan has not foreseen takes longer than its ramp.
   const std::uint64_t longer =
       std::max(excitation_.ramp_samples(), dwell.ramp_samples) - dwell.ramp_samples;

@@ -25,10 +25,9 @@ class DwellRun {
   DwellRun(const SweepPlan& plan, const RunnerSettings& settings, std::size_t sensors,
            const Excitation& excitation, Guard& guard, RecordSink& sink);
 
-  // `index` in running order, `attempt` at it, `scale` of its planned amplitudes, `tick` its first;
-  // `by_detection`: its transient is not modelled.
+  // `index` in running order, `attempt` at it, `scale` of its planned amplitudes, `tick` its first.
   void begin(const Dwell& dwell, std::uint32_t index, std::uint32_t attempt, double scale,
-             std::uint64_t tick, bool by_detection = false) noexcept SINERIG_NONBLOCKING;
+             std::uint64_t tick, const Beginning& beginning) noexcept SINERIG_NONBLOCKING;
   bool begun() const noexcept { return ticks_ > 0; }
 
   // `ticks` of the grid have passed since the last call, this one included.

@@ -50,6 +50,9 @@ class Excitation {
   // the next no faster than its limit allows.
   double move(std::uint64_t ticks) noexcept SINERIG_NONBLOCKING;
 
+  // Nothing has been played before the dwell that is to begin.
+  bool resting() const noexcept { return tones_ == 0; }
+
   // The dwell's tones are what is played: the ramp is over, and nothing is left to be caught up.
   bool on_course() const noexcept {
     return !closing_ && tones_ > 0 && elapsed_ >= ramp_samples_ && !lagging_;

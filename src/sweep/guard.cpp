@@ -73,10 +73,11 @@ double Guard::ramp_down(std::uint64_t ticks) noexcept {
 
 void Guard::observe_write(const Sample& applied, std::uint64_t tick) noexcept {
   if (applied.fault == Fault::stale) return;
-  if (applied.fault == Fault::none) applied_ = applied.value;
-  applied_known_ = applied.fault == Fault::none;
+  const bool good = applied.fault == Fault::none && std::isfinite(applied.value);
+  if (good) applied_ = applied.value;
+  applied_known_ = good;
   if (applied.fault == Fault::device) trip(TripCause::actuator_fault, 0, 0.0, 0.0, tick);
-  write_faults_ = applied.fault == Fault::none ? 0 : write_faults_ + 1;
+  write_faults_ = good ? 0 : write_faults_ + 1;
   if (settings_.max_write_faults != 0 && write_faults_ >= settings_.max_write_faults) {
     trip(TripCause::actuator_fault, 0, write_faults_, settings_.max_write_faults, tick);
   }

@@ -62,9 +62,10 @@ void Measurement::know(const ModePrior& prior, std::span<const double> noise_var
   if (modal_) modal_->know(prior, noise_variance, noise_dof);
 }
 
-void Measurement::start(const Dwell& dwell, bool by_detection) noexcept {
+void Measurement::start(const Dwell& dwell, const Beginning& beginning) noexcept {
   dwell_ = &dwell;
-  by_detection_ = by_detection;
+  by_detection_ = beginning.by_detection;
+  foreseen_ = taught_ && !beginning.from_rest;
   std::size_t bin = 0;
   for (const Tone& tone : dwell.tones) omega_[bin++] = angular_frequency(dwell, tone, rate_hz_);
   for (std::uint32_t order = 2; order <= dwell.harmonics; ++order)
@@ -127,6 +128,7 @@ void Measurement::take_modal() noexcept {
 }
 
 void Measurement::disturb() noexcept {
+  foreseen_ = false;
   regression_.forget();
   restart();
 }

@@ -27,6 +27,12 @@ struct Check {
   bool agrees = true;         // within the noise of both, or half the target
 };
 
+// How a dwell begins.
+struct Beginning {
+  bool by_detection = false;  // its transient is not modelled
+  bool from_rest = false;     // not out of the dwell before
+};
+
 // A pair of regression channels (0 is what was applied, 1… the sensors) whose ratio is a response.
 // A dwell goes on until all have settled and, unless the target is of the first only, meet it.
 using Pairs = std::vector<Pair>;
@@ -49,8 +55,7 @@ class Measurement {
   // Before the loop begins.
   void solve_elsewhere();
 
-  // `by_detection`: its transient is not modelled.
-  void start(const Dwell& dwell, bool by_detection = false) noexcept SINERIG_NONBLOCKING;
+  void start(const Dwell& dwell, const Beginning& beginning = {}) noexcept SINERIG_NONBLOCKING;
 
   // One tick after the wait.
   void add(std::span<const Phasor> phasors,
@@ -178,6 +183,8 @@ class Measurement {
   bool begins_ = false;
   bool done_ = false;
   bool taught_ = false;  // the memories have taken in this dwell
+  bool foreseen_ =
+      false;  // it began out of a dwell that they have taken in, and went on from there
 };
 
 }  // namespace sinerig

@@ -139,6 +139,8 @@ void Measurement::look_for_transient(std::size_t pair, const Window& window) noe
     if (tones == 1) {
       bound = transients_[pair].bound(whole.estimate.response, omega_[tone],
                                       std::abs(whole.estimate.input));
+      // The whole of the response, where it is not the change from one to the next.
+      if (!foreseen_) bound.size = std::max(1.0, bound.size);
     }
     const double shift = whole.late.shift;
     const double noise = whole.late.noise;

@@ -155,12 +155,14 @@ void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
     scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
     if (preflight_) scale_ = std::min(scale_, settings_.preflight.level);
   }
+  const bool from_rest = excitation_.resting();
   excitation_.start(dwell, scale_);
   if (remeasuring_ && trust_.condemned(dwell_)) {
     trust_.acquit(dwell_);
     announce({.kind = EventKind::remeasured, .dwell = dwell_, .tick = tick});
   }
-  run_.begin(dwell, dwell_, attempt_, scale_, tick, trust_.by_detection(dwell_));
+  run_.begin(dwell, dwell_, attempt_, scale_, tick,
+             {.by_detection = trust_.by_detection(dwell_), .from_rest = from_rest});
   announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
 }
 
