@@ -16,7 +16,29 @@ using config::zero_or_more;
 constexpr Range a_byte{.min = 0.0, .max = 255.0};
 constexpr Range a_payload_position{.min = 0.0, .max = max_fd_bytes - 1};
 
+void convert_to_unit_of(const config::Section& section, Signal& signal) {
+  const double factor = section.number("unit_scale", any_number, 1.0);
+  if (factor == 0.0) section.refuse("unit_scale", "must not be 0");
+  signal.scale *= factor;
+  signal.offset *= factor;
+  signal.minimum *= factor;
+  signal.maximum *= factor;
+  if (factor < 0.0) std::swap(signal.minimum, signal.maximum);
+  signal.wrap_modulus *= std::abs(factor);
+  signal.minimum = section.number("clamp_min", any_number, signal.minimum);
+  signal.maximum = section.number("clamp_max", any_number, signal.maximum);
+  signal.wrap_modulus = section.number("wrap", zero_or_more, signal.wrap_modulus);
+}
+
 }  // namespace
+
+bool is_held(const Signal& signal, double value, double held) {
+  const bool is_float =
+      signal.encoding == Encoding::float32 || signal.encoding == Encoding::float64;
+  const double rounding = is_float ? 1e-6 * (std::abs(value) + std::abs(signal.offset))
+                                   : 0.500001 * std::abs(signal.scale);
+  return std::abs(held - value) <= rounding;
+}
 
 const Dbc& ConfigReader::dbc(const Keys& keys) {
   const Keys& holder = holder_of("dbc", keys);
@@ -116,18 +138,17 @@ Signal ConfigReader::layout(const Keys& keys) const {
   return signal;
 }
 
-// `unit_scale` turns the device's unit into the rig's; clamp and wrap are in the rig's.
+// `unit_scale` turns what the frame holds into the profile's unit and the rig's into the rig's: the
+// factors multiply. Clamps and wrap are in the unit of the file that gives them.
 void ConfigReader::convert_unit(const Keys& keys, Signal& signal) const {
-  const double factor = keys.number("unit_scale", any_number, 1.0);
-  if (factor == 0.0) keys.refuse("unit_scale", "must not be 0");
-  signal.scale *= factor;
-  signal.offset *= factor;
-  signal.minimum *= factor;
-  signal.maximum *= factor;
-  if (factor < 0.0) std::swap(signal.minimum, signal.maximum);
-  signal.minimum = keys.number("clamp_min", any_number, signal.minimum);
-  signal.maximum = keys.number("clamp_max", any_number, signal.maximum);
-  signal.wrap_modulus = keys.number("wrap", zero_or_more, 0.0);
+  convert_to_unit_of(keys.base(), signal);
+  if (!keys.over()) return;
+  const config::Section& rig = *keys.over();
+  if (rig.has("unit") && keys.base().has("unit") && !rig.has("unit_scale") &&
+      rig.text("unit") != keys.base().text("unit"))
+    rig.refuse("unit", "the profile's is \"" + keys.base().text("unit") +
+                           "\"; give unit_scale: how many of this unit are one of the profile's");
+  convert_to_unit_of(rig, signal);
 }
 
 ConfigReader::Place ConfigReader::place_by_name(const Keys& keys) {
@@ -175,21 +196,21 @@ void ConfigReader::fill(const Keys& keys, Frame& frame, bool by_name) {
       signal = layout(entry);
       at_key(entry, "start_bit", [&] { check(signal, frame.length); });
     }
-    put_value(entry, frame, signal);
+    put_value(entry, "value", frame, signal);
   }
 }
 
 // Rounded to the nearest code; one that is not near is a mistake, not a set-point to be clamped.
-void ConfigReader::put_value(const Keys& entry, Frame& frame, const Signal& signal) {
-  const double value = entry.at("value").number("value", any_number);
+double ConfigReader::put_value(const Keys& entry, std::string_view key, Frame& frame,
+                               const Signal& signal) {
+  const double value = entry.at(key).number(key, any_number);
   const double held = encode(frame.payload(), signal, value);
-  const bool is_float =
-      signal.encoding == Encoding::float32 || signal.encoding == Encoding::float64;
-  const double rounding = is_float ? 1e-6 * std::abs(value) : 0.500001 * std::abs(signal.scale);
-  if (std::abs(held - value) <= rounding) return;
-  std::ostringstream rule;
-  rule << "is outside what the signal can hold: " << held << " is the nearest";
-  entry.refuse("value", rule.str());
+  if (!is_held(signal, value, held)) {
+    std::ostringstream rule;
+    rule << "is outside what the signal can hold: " << held << " is the nearest";
+    entry.refuse(key, rule.str());
+  }
+  return held;
 }
 
 Checksum ConfigReader::checksum(const Keys& keys, std::size_t bytes) const {

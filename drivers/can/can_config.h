@@ -17,6 +17,9 @@ namespace sinerig::can {
 // What an identifier can be.
 inline constexpr config::Range an_id{.min = 0.0, .max = max_extended_id};
 
+// Whether `held`, what encode() made of `value`, is that but for rounding.
+bool is_held(const Signal& signal, double value, double held);
+
 class ConfigReader {
  public:
   // `device` has what all channels of a profile share: dbc, node_step, lists; none without a
@@ -24,8 +27,9 @@ class ConfigReader {
   ConfigReader(std::optional<Keys> device, std::uint32_t node)
       : device_{std::move(device)}, node_{node} {}
 
-  // All throw config::ConfigError at the key that is wrong.
-  CommandSettings command(const Keys& keys, double neutral);
+  // All throw config::ConfigError at the key that is wrong. Without `neutral`, which is the rig's,
+  // the command is read to be checked only.
+  CommandSettings command(const Keys& keys, std::optional<double> neutral);
   FeedbackSettings feedback(const Keys& keys);
 
  private:
@@ -44,9 +48,11 @@ class ConfigReader {
   Frame frame(const Keys& keys);
   Frame frame_of_message(const Keys& keys, const DbcMessage& message) const;
   void fill(const Keys& keys, Frame& frame, bool by_name);
-  static void put_value(const Keys& entry, Frame& frame, const Signal& signal);
+  static double put_value(const Keys& entry, std::string_view key, Frame& frame,
+                          const Signal& signal);
   Checksum checksum(const Keys& keys, std::size_t bytes) const;
   void require_bytes(const Keys& keys, std::string_view key, Pattern& pattern) const;
+  static void check_neutral(const Keys& keys, const CommandSettings& settings);
   Pattern expected(const Keys& keys);
   Step step(const Keys& keys);
   Sequence sequence(const Keys& keys, std::string_view list);

@@ -188,7 +188,7 @@ class CanDevice final : public Device {
     ConfigReader reader{Keys{device, profile.folder}, 0};
     for (const Section& command : profile.file->children("command")) {
       command.text("unit");
-      reader.command(Keys{command, profile.folder}, 0.0);
+      reader.command(Keys{command, profile.folder}, std::nullopt);
     }
     for (const Section& feedback : profile.file->children("feedback")) {
       feedback.text("unit");

@@ -2,6 +2,7 @@
 // keep-alive; and the channel as a whole.
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 
 #include "drivers/can/can_config.h"
@@ -33,7 +34,7 @@ Pattern ConfigReader::expected(const Keys& keys) {
     pattern.extended = found.frame.extended;
     Frame scratch;
     scratch.length = max_fd_bytes;
-    put_value(entry, scratch, found.signal);
+    put_value(entry, "value", scratch, found.signal);
     pattern.require(found.signal, extract_raw(scratch.payload(), found.signal));
   }
   return pattern;
@@ -123,7 +124,20 @@ void ConfigReader::watch(const Keys& keys, CommandSettings& settings) {
   for (const Keys& entry : keys.joined_tables("health")) settings.health.push_back(health(entry));
 }
 
-CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
+// What is sent at every stop must not be the nearest thing that the clamp lets through.
+void ConfigReader::check_neutral(const Keys& keys, const CommandSettings& settings) {
+  Frame scratch = settings.frame;
+  const double held = encode(scratch.payload(), settings.signal, settings.neutral);
+  if (is_held(settings.signal, settings.neutral, held)) return;
+  std::ostringstream rule;
+  rule << "cannot carry the neutral command " << settings.neutral << ": " << held
+       << " is the nearest that clamp_min, clamp_max, the DBC file's range and the bits allow";
+  for (const std::string_view key : {"clamp_min", "clamp_max", "signal"})
+    if (keys.has(key)) keys.refuse(key, rule.str());
+  keys.refuse("start_bit", rule.str());
+}
+
+CommandSettings ConfigReader::command(const Keys& keys, std::optional<double> neutral) {
   const bool by_name = keys.has("signal");
   const std::string_view where = by_name ? "signal" : "start_bit";
   Place found = place(keys);
@@ -136,7 +150,8 @@ CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
     check(settings.signal, settings.frame.length);
   });
   settings.checksum = checksum(keys, settings.frame.length);
-  settings.neutral = neutral;
+  settings.neutral = neutral.value_or(0.0);
+  if (neutral) check_neutral(keys, settings);
   settings.startup = sequence(keys, "startup");
   settings.arm = sequence(keys, "arm");
   settings.disarm = sequence(keys, "disarm");

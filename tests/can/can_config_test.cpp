@@ -227,6 +227,66 @@ TEST(CanProfile, ListsOfTheRigFollowThoseOfTheProfile) {
   EXPECT_EQ(torque.health.size(), 3u);
 }
 
+// A channel of a shipped profile with these keys of a rig file over it.
+struct Laid {
+  Profile profile;
+  std::unique_ptr<RigFile> rig;
+  std::string kind, name;
+
+  Laid(const std::string& file, const std::string& kind_, const std::string& name_,
+       const std::string& keys, std::uint32_t node = 1)
+      : profile(file, node),
+        rig(RigFile::parse("[c]\n" + keys, "rig.toml")),
+        kind(kind_),
+        name(name_) {}
+  Keys keys() const { return {rig->section("c"), ".", profile.part(kind, name).base(), devices}; }
+  CommandSettings command() const { return profile.reader().command(keys(), 0.0); }
+  FeedbackSettings feedback() const { return profile.reader().feedback(keys()); }
+};
+
+// 1 turn/s of the drive is 2π rad/s of the profile, and twice that of the rig.
+TEST(CanProfile, TheRigsUnitScaleIsAddedToThatOfTheProfile) {
+  const Laid velocity("odrive.toml", "command", "velocity", "unit_scale = 2\n");
+  EXPECT_EQ(set_point(velocity.command(), 12.566370614359172),
+            (Bytes{0, 0, 0x80, 0x3F, 0, 0, 0, 0}));
+  EXPECT_EQ(set_point(Laid("odrive.toml", "command", "velocity", "unit_scale = 1\n").command(),
+                      6.283185307179586),
+            (Bytes{0, 0, 0x80, 0x3F, 0, 0, 0, 0}));
+  const Laid turned("odrive.toml", "feedback", "position", "unit_scale = -1\n");
+  EXPECT_DOUBLE_EQ(value_of(turned.feedback(), {0, 0, 0x80, 0x3E, 0, 0, 0, 0}),
+                   -1.5707963267948966);
+}
+
+TEST(CanProfile, AnotherUnitThanThatOfTheProfileNeedsItsFactor) {
+  EXPECT_THAT([] { Laid("odrive.toml", "feedback", "position", "unit = \"deg\"\n").feedback(); },
+              testing::ThrowsMessage<ConfigError>(
+                  HasSubstr("rig.toml:2: [c] unit = 'deg': the profile's is \"rad\"; give "
+                            "unit_scale: how many of this unit are one of the profile's")));
+  EXPECT_NO_THROW(Laid("odrive.toml", "feedback", "position", "unit = \"deg\"\nunit_scale = 57.3\n")
+                      .feedback());
+  EXPECT_NO_THROW(Laid("odrive.toml", "feedback", "position", "unit = \"rad\"\n").feedback());
+}
+
+TEST(CanProfile, ClampAndWrapOfTheProfileFollowTheRigsUnit) {
+  const auto most = [](const CommandSettings& settings) {
+    Frame frame = settings.frame;
+    return encode(frame.payload(), settings.signal, 1e9);
+  };
+  const auto rmd = [](const std::string& keys) {
+    return Laid("myactuator-rmd.toml", "command", "current", keys).command();
+  };
+  EXPECT_NEAR(most(rmd("unit_scale = 0.1\n")), 2.0, 1e-9) << "20 A, in Nm";
+  EXPECT_NEAR(most(rmd("unit_scale = -0.1\nclamp_min = -1\n")), 2.0, 1e-9);
+  EXPECT_NEAR(most(rmd("unit_scale = 0.1\nclamp_max = 1.5\n")), 1.5, 1e-9) << "the rig's unit";
+  const CommandSettings gm =
+      Laid("dji-gm6020.toml", "command", "current", "unit_scale = 0.741\n").command();
+  EXPECT_NEAR(most(gm), 3.0 * 0.741, 1e-9);
+  EXPECT_EQ(set_point(gm, 1e9), (Bytes{0x40, 0, 0, 0, 0, 0, 0, 0})) << "full scale, 16384";
+  const FeedbackSettings degrees =
+      Laid("dji-gm6020.toml", "feedback", "angle", "unit_scale = -57.29577951308232\n").feedback();
+  EXPECT_NEAR(degrees.signal.wrap_modulus, 360.0, 1e-9);
+}
+
 TEST(CanProfile, EveryShippedProfileIsReadWholeByTheDriver) {
   int profiles = 0;
   for (const auto& entry : std::filesystem::directory_iterator(devices)) {
@@ -286,6 +346,17 @@ TEST(CanConfig, RefusesConstantsThatTheirBitsCannotHold) {
           "id = 1\nexpect = [{ dbc = \"odrive-cansimple.dbc\", signal = \"Heartbeat.Axis_State\", "
           "value = 300 }]\n"),
       HasSubstr("is outside what the signal can hold: 255"));
+}
+
+// What goes out at every stop.
+TEST(CanConfig, RefusesAClampThatNeutralDoesNotPass) {
+  const std::string frame = "id = 0x10\nlength = 8\nstart_bit = 0\n";
+  EXPECT_THAT(
+      refusal(frame + "clamp_min = 10\nclamp_max = 20\n"),
+      HasSubstr("rig.toml:5: [actuator] clamp_min = 10: cannot carry the neutral command 0: "
+                "10 is the nearest that clamp_min, clamp_max"));
+  EXPECT_THAT(refusal(frame + "offset = 1\n"), HasSubstr("cannot carry the neutral command 0: 1 "));
+  EXPECT_EQ(refusal(frame + "bits = 12\nrange = [-10, 10]\n"), "") << "half a code beside it";
 }
 
 TEST(CanConfig, TakesEveryPollAndOnlyPollsThatAskSomething) {
