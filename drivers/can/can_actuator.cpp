@@ -9,11 +9,16 @@ CanActuator::CanActuator(Bus& bus, CommandSettings settings)
       settings_(std::move(settings)),
       health_(bus, settings_.health),
       next_keep_alive_ns_(settings_.keep_alive.size(), 0),
-      frame_(settings_.frame) {
+      frame_(settings_.frame),
+      released_frame_(settings_.released.value_or(settings_.frame)) {
   check(frame_);
   check(settings_.signal, frame_.length);
   check(settings_.checksum, frame_.length);
   compose(settings_.neutral);
+  check(released_frame_);
+  check(settings_.signal, released_frame_.length);
+  neutral_ = encode(released_frame_.payload(), settings_.signal, settings_.neutral);
+  seal(released_frame_, settings_.checksum);
   for (Sequence* list :
        {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown}) {
     for (Step& step : *list) {
@@ -96,11 +101,11 @@ void CanActuator::keep_alive(std::int64_t now_ns) noexcept {
   }
 }
 
-// A device may take a set-point only with the SYNC that comes with every one.
+// A device may take a set-point only with the SYNC that comes with every one. The set-points of the
+// loop may switch it on, which a release must not, in whatever state it finds the device.
 bool CanActuator::send_neutral(Patience& patience) noexcept {
-  compose(settings_.neutral);
-  bool all = send_surely(bus_, frame_, patience) == SendResult::sent;
-  if (all) held_.value = encoded_;
+  bool all = send_surely(bus_, released_frame_, patience) == SendResult::sent;
+  if (all) held_.value = neutral_;
   for (const KeepAlive& kept : settings_.keep_alive) {
     if (kept.period_ns > 0) continue;
     all = send_surely(bus_, kept.frame, patience) == SendResult::sent && all;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,8 @@ struct KeepAlive {
 };
 
 struct CommandSettings {
-  Frame frame;  // constant bytes and signals are in it already
+  Frame frame;                    // constant bytes and signals are in it already
+  std::optional<Frame> released;  // carries neutral to a device that is to be off; none: `frame`
   Signal signal;
   Checksum checksum;
   double neutral = 0.0;
@@ -46,9 +48,9 @@ class CanActuator final : public Actuator {
   // must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
-  // Neutral command, then the disarm list. What finds the queue full is tried for 20 ms per frame,
-  // a dead bus for 0.3 s in all. What then has not gone out is tried again by the next release(),
-  // by start() and by the destructor.
+  // Neutral command, in the frame that does not switch on, then the disarm list. What finds the
+  // queue full is tried for 20 ms per frame, a dead bus for 0.3 s in all. What then has not gone
+  // out is tried again by the next release(), by start() and by the destructor.
   void release() noexcept override;
   bool released() const noexcept { return released_; }
 
@@ -66,6 +68,8 @@ class CanActuator final : public Actuator {
   std::vector<std::int64_t> next_keep_alive_ns_;
   Frame frame_;
   double encoded_ = 0.0;  // what the bits in frame_ mean
+  Frame released_frame_;
+  double neutral_ = 0.0;  // what the bits in released_frame_ mean
   Sample held_;
   const HealthRule* violated_ = nullptr;
   SendResult last_result_ = SendResult::sent;

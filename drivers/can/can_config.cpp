@@ -13,7 +13,6 @@ using config::any_number;
 using config::Range;
 using config::zero_or_more;
 
-constexpr Range a_byte{.min = 0.0, .max = 255.0};
 constexpr Range a_payload_position{.min = 0.0, .max = max_fd_bytes - 1};
 
 void convert_to_unit_of(const config::Section& section, Signal& signal) {

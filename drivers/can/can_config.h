@@ -16,6 +16,7 @@ namespace sinerig::can {
 
 // What an identifier can be.
 inline constexpr config::Range an_id{.min = 0.0, .max = max_extended_id};
+inline constexpr config::Range a_byte{.min = 0.0, .max = 255.0};
 
 // Whether `held`, what encode() made of `value`, is that but for rounding.
 bool is_held(const Signal& signal, double value, double held);
@@ -52,6 +53,7 @@ class ConfigReader {
                           const Signal& signal);
   Checksum checksum(const Keys& keys, std::size_t bytes) const;
   void require_bytes(const Keys& keys, std::string_view key, Pattern& pattern) const;
+  Frame released(const Keys& keys, Frame frame, bool by_name);
   static void check_neutral(const Keys& keys, const CommandSettings& settings);
   Pattern expected(const Keys& keys);
   Step step(const Keys& keys);

@@ -124,6 +124,17 @@ void ConfigReader::watch(const Keys& keys, CommandSettings& settings) {
   for (const Keys& entry : keys.joined_tables("health")) settings.health.push_back(health(entry));
 }
 
+// The set-point's frame with other constant bytes.
+Frame ConfigReader::released(const Keys& keys, Frame frame, bool by_name) {
+  const std::vector<double> bytes = keys.at("release_bytes").numbers("release_bytes", a_byte);
+  if (by_name || bytes.size() != frame.length)
+    keys.refuse("release_bytes", "takes the place of bytes, and is as long as the frame");
+  std::ranges::transform(bytes, frame.data.begin(),
+                         [](double byte) { return static_cast<std::uint8_t>(byte); });
+  fill(keys, frame, by_name);
+  return frame;
+}
+
 // What is sent at every stop must not be the nearest thing that the clamp lets through.
 void ConfigReader::check_neutral(const Keys& keys, const CommandSettings& settings) {
   Frame scratch = settings.frame;
@@ -149,6 +160,7 @@ CommandSettings ConfigReader::command(const Keys& keys, std::optional<double> ne
     check(settings.frame);
     check(settings.signal, settings.frame.length);
   });
+  if (keys.has("release_bytes")) settings.released = released(keys, found.frame, by_name);
   settings.checksum = checksum(keys, settings.frame.length);
   settings.neutral = neutral.value_or(0.0);
   if (neutral) check_neutral(keys, settings);

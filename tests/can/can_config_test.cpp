@@ -1,5 +1,6 @@
 #include "drivers/can/can_config.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -9,6 +10,7 @@
 #include <gmock/gmock.h>
 
 #include "drivers/can/can_driver.h"
+#include "tests/can/shipped_profile.h"
 
 namespace sinerig::can {
 namespace {
@@ -19,33 +21,9 @@ using config::Section;
 using testing::HasSubstr;
 using Bytes = std::vector<std::uint8_t>;
 
-const std::string devices = std::string(SINERIG_SOURCE_DIR) + "/config/devices";
-
 Bytes bytes_of(const Frame& frame) {
   return {frame.data.begin(), frame.data.begin() + frame.length};
 }
-
-// The parts of a shipped profile, as a rig file with this node would have them.
-struct Profile {
-  std::unique_ptr<RigFile> file;
-  std::uint32_t node;
-
-  Profile(const std::string& name, std::uint32_t node_)
-      : file(RigFile::load(devices + "/" + name)), node(node_) {}
-
-  Keys part(const std::string& kind, const std::string& name) const {
-    for (const Section& section : file->children(kind))
-      if (section.name() == kind + "." + name) return Keys{section, devices};
-    throw std::out_of_range(kind + "." + name);
-  }
-  ConfigReader reader() const { return {Keys{file->section("device"), devices}, node}; }
-  CommandSettings command(const std::string& name) const {
-    return reader().command(part("command", name), 0.0);
-  }
-  FeedbackSettings feedback(const std::string& name) const {
-    return reader().feedback(part("feedback", name));
-  }
-};
 
 Bytes set_point(const CommandSettings& settings, double value) {
   Frame frame = settings.frame;
@@ -164,6 +142,21 @@ TEST(CanProfile, Cia402GetsItsNeutralSetPointRightBeforeOperationIsEnabled) {
               testing::ElementsAre("NMT operational", "neutral", "controlword enable operation"));
 }
 
+TEST(CanProfile, Cia402IsWellOnlyInOperation) {
+  const CommandSettings torque = Profile("cia402.toml", 4).command("torque");
+  const auto is_well = [&](std::uint8_t statusword) {
+    const Bytes report{statusword, 0x02};
+    return std::ranges::all_of(torque.health, [&](const HealthRule& rule) {
+      return decode(report, rule.signal) == rule.value;
+    });
+  };
+  EXPECT_TRUE(is_well(0x37));
+  EXPECT_TRUE(is_well(0x27));
+  EXPECT_FALSE(is_well(0x07)) << "quick stop active";
+  EXPECT_FALSE(is_well(0x2F)) << "fault reaction active";
+  EXPECT_FALSE(is_well(0x33)) << "switched on";
+}
+
 // A drive's first answers say that it is stopped: health must not see them.
 TEST(CanProfile, MoteusIsArmedOnceItReportsPositionMode) {
   for (const std::uint32_t node : {1U, 7U, 8U, 100U}) {
@@ -203,6 +196,8 @@ TEST(CanProfile, MiniCheetahIsBelievedWithoutAState) {
 TEST(CanProfile, TellWhatComesOnlyAsAnAnswer) {
   EXPECT_TRUE(Profile("moteus.toml", 1).feedback("torque").answers_command);
   EXPECT_TRUE(Profile("mit-dm4310.toml", 1).feedback("position").answers_command);
+  for (const char* name : {"position", "velocity", "torque"})
+    EXPECT_TRUE(Profile("cia402.toml", 1).feedback(name).answers_command) << "to a SYNC";
   EXPECT_TRUE(Profile("myactuator-rmd.toml", 1).feedback("velocity").answers_command);
   EXPECT_FALSE(Profile("myactuator-rmd.toml", 1).feedback("angle").answers_command) << "asked for";
   EXPECT_FALSE(Profile("odrive.toml", 1).feedback("position").answers_command);
@@ -226,23 +221,6 @@ TEST(CanProfile, ListsOfTheRigFollowThoseOfTheProfile) {
   EXPECT_EQ(torque.keep_alive.size(), 1u);
   EXPECT_EQ(torque.health.size(), 3u);
 }
-
-// A channel of a shipped profile with these keys of a rig file over it.
-struct Laid {
-  Profile profile;
-  std::unique_ptr<RigFile> rig;
-  std::string kind, name;
-
-  Laid(const std::string& file, const std::string& kind_, const std::string& name_,
-       const std::string& keys, std::uint32_t node = 1)
-      : profile(file, node),
-        rig(RigFile::parse("[c]\n" + keys, "rig.toml")),
-        kind(kind_),
-        name(name_) {}
-  Keys keys() const { return {rig->section("c"), ".", profile.part(kind, name).base(), devices}; }
-  CommandSettings command() const { return profile.reader().command(keys(), 0.0); }
-  FeedbackSettings feedback() const { return profile.reader().feedback(keys()); }
-};
 
 // 1 turn/s of the drive is 2π rad/s of the profile, and twice that of the rig.
 TEST(CanProfile, TheRigsUnitScaleIsAddedToThatOfTheProfile) {
@@ -357,6 +335,12 @@ TEST(CanConfig, RefusesAClampThatNeutralDoesNotPass) {
                 "10 is the nearest that clamp_min, clamp_max"));
   EXPECT_THAT(refusal(frame + "offset = 1\n"), HasSubstr("cannot carry the neutral command 0: 1 "));
   EXPECT_EQ(refusal(frame + "bits = 12\nrange = [-10, 10]\n"), "") << "half a code beside it";
+}
+
+TEST(CanConfig, ReleaseBytesAreThoseOfTheFrame) {
+  const std::string frame = "id = 0x10\nbytes = [1, 0, 0]\nstart_bit = 8\n";
+  EXPECT_EQ(refusal(frame + "release_bytes = [2, 0, 0]\n"), "");
+  EXPECT_THAT(refusal(frame + "release_bytes = [2, 0]\n"), HasSubstr("is as long as the frame"));
 }
 
 TEST(CanConfig, TakesEveryPollAndOnlyPollsThatAskSomething) {
