@@ -58,6 +58,8 @@ class ConfigReader {
   Pattern expected(const Keys& keys);
   Step step(const Keys& keys);
   Sequence sequence(const Keys& keys, std::string_view list);
+  static void check_received(const Keys& keys, const Frame& frame, const Signal& signal);
+  static double value_of_code(const Keys& keys, std::string_view key, Signal signal);
   HealthRule health(const Keys& keys);
   void watch(const Keys& keys, CommandSettings& settings);
   const Dbc& dbc(const Keys& keys);

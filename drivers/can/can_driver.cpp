@@ -141,7 +141,8 @@ class CanDevice final : public Device {
     return settings.frame.fd || has_fd(settings.startup) || has_fd(settings.arm) ||
            has_fd(settings.disarm) || has_fd(settings.shutdown) ||
            std::ranges::any_of(settings.keep_alive,
-                               [](const KeepAlive& kept) { return kept.frame.fd; });
+                               [](const KeepAlive& kept) { return kept.frame.fd; }) ||
+           std::ranges::any_of(settings.health, &HealthRule::fd);
   }
 
   std::size_t interface_of(const Section& section, bool fd) {

@@ -2,6 +2,7 @@
 // keep-alive; and the channel as a whole.
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <utility>
 
@@ -28,10 +29,19 @@ Pattern ConfigReader::expected(const Keys& keys) {
     require_bytes(keys, "expect_bytes", pattern);
     return pattern;
   }
-  for (const Keys& entry : keys.tables("expect")) {
+  const std::vector<Keys> entries = keys.tables("expect");
+  if (entries.empty()) keys.refuse("expect", "needs a signal at least");
+  for (const Keys& entry : entries) {
     const Place found = place_by_name(entry);
-    pattern.id = found.frame.id;
-    pattern.extended = found.frame.extended;
+    if (&entry == &entries.front()) {
+      pattern = found.pattern;
+      pattern.id = found.frame.id;
+      pattern.extended = found.frame.extended;
+    } else if (found.frame.id != pattern.id || found.frame.extended != pattern.extended) {
+      entry.refuse("signal", "is in another message than the signals before it");
+    } else if (!pattern.join(found.pattern)) {
+      entry.refuse("signal", "is in another page of the message than the signals before it");
+    }
     Frame scratch;
     scratch.length = max_fd_bytes;
     put_value(entry, "value", scratch, found.signal);
@@ -90,6 +100,23 @@ Sequence ConfigReader::sequence(const Keys& keys, std::string_view list) {
   return sequence;
 }
 
+// Every bit that is read must come: in a payload of the length given, else in the longest there is.
+void ConfigReader::check_received(const Keys& keys, const Frame& frame, const Signal& signal) {
+  const std::size_t longest = frame.fd ? max_fd_bytes : max_classic_bytes;
+  const std::size_t bytes = frame.length > 0 ? frame.length : longest;
+  at_key(keys, keys.has("signal") ? "signal" : "start_bit", [&] { check(signal, bytes); });
+}
+
+// What decode() makes of the code that stands for a number: 3 · 0.1 is not 0.3. A device may send
+// what is outside of the range that its DBC file tells.
+double ConfigReader::value_of_code(const Keys& keys, std::string_view key, Signal signal) {
+  signal.minimum = -std::numeric_limits<double>::infinity();
+  signal.maximum = std::numeric_limits<double>::infinity();
+  Frame scratch;
+  scratch.length = max_fd_bytes;
+  return put_value(keys, key, scratch, signal);
+}
+
 HealthRule ConfigReader::health(const Keys& keys) {
   HealthRule rule;
   rule.name = keys.at("name").text("name");
@@ -97,6 +124,8 @@ HealthRule ConfigReader::health(const Keys& keys) {
   rule.pattern = found.pattern;
   require_bytes(keys, "match_bytes", rule.pattern);
   rule.signal = found.signal;
+  rule.fd = found.frame.fd;
+  check_received(keys, found.frame, rule.signal);
   using Operator = HealthRule::Operator;
   const std::pair<const char*, Operator> operators[] = {{"equals", Operator::equal},
                                                         {"not", Operator::not_equal},
@@ -107,7 +136,9 @@ HealthRule ConfigReader::health(const Keys& keys) {
     if (!keys.has(key)) continue;
     ++given;
     rule.comparison = comparison;
-    rule.value = keys.at(key).number(key, any_number);
+    const bool by_code = comparison == Operator::equal || comparison == Operator::not_equal;
+    rule.value =
+        by_code ? value_of_code(keys, key, found.signal) : keys.at(key).number(key, any_number);
   }
   if (given != 1) keys.refuse("name", "needs exactly one of equals, not, at_most, at_least");
   rule.max_age_ns = nanoseconds(keys.number("max_age_s", zero_or_more, 0.0));
@@ -181,9 +212,8 @@ FeedbackSettings ConfigReader::feedback(const Keys& keys) {
   settings.pattern.id_mask =
       static_cast<std::uint32_t>(keys.integer("id_mask", an_id, max_extended_id));
   require_bytes(keys, "match_bytes", settings.pattern);
+  check_received(keys, found.frame, settings.signal);
   settings.pattern.cover(settings.signal);
-  at_key(keys, keys.has("signal") ? "signal" : "start_bit",
-         [&] { check(settings.signal, settings.pattern.minimum_length); });
   settings.checksum = checksum(keys, std::max(found.frame.length, settings.pattern.minimum_length));
   settings.fd = found.frame.fd;
   if (keys.has("invalid"))

@@ -73,6 +73,17 @@ void Pattern::require(const Signal& signal, std::uint64_t raw) noexcept {
   cover(signal);
 }
 
+bool Pattern::join(const Pattern& other) noexcept {
+  unsigned contrary = 0;
+  for (std::size_t n = 0; n < max_fd_bytes; ++n) {
+    contrary |= static_cast<unsigned>((value[n] ^ other.value[n]) & mask[n] & other.mask[n]);
+    value[n] = static_cast<std::uint8_t>((value[n] & mask[n]) | (other.value[n] & other.mask[n]));
+    mask[n] = static_cast<std::uint8_t>(mask[n] | other.mask[n]);
+  }
+  minimum_length = std::max(minimum_length, other.minimum_length);
+  return contrary == 0;
+}
+
 void Pattern::cover(const Signal& signal) noexcept {
   while (minimum_length < max_fd_bytes && !fits(signal, minimum_length)) ++minimum_length;
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -341,6 +342,98 @@ TEST(CanConfig, ReleaseBytesAreThoseOfTheFrame) {
   const std::string frame = "id = 0x10\nbytes = [1, 0, 0]\nstart_bit = 8\n";
   EXPECT_EQ(refusal(frame + "release_bytes = [2, 0, 0]\n"), "");
   EXPECT_THAT(refusal(frame + "release_bytes = [2, 0]\n"), HasSubstr("is as long as the frame"));
+}
+
+HealthRule health_rule(const std::string& keys) {
+  const auto file = RigFile::parse(
+      "[actuator]\nid = 0x10\nlength = 8\nstart_bit = 0\n[[actuator.health]]\nname = \"x\"\n" +
+          keys,
+      "rig.toml");
+  ConfigReader reader(std::nullopt, 2);
+  return reader.command(Keys{file->section("actuator"), devices}, 0.0).health.at(0);
+}
+
+TEST(CanConfig, RefusesHealthRulesThatCannotBeRead) {
+  EXPECT_THAT(
+      [] { health_rule("id = 3\nlength = 8\nstart_bit = 60\nbits = 8\nequals = 0\n"); },
+      testing::ThrowsMessage<ConfigError>(HasSubstr("start_bit = 60: signal at bits 60|8 Intel")));
+  EXPECT_THAT([] { health_rule("id = 3\nstart_bit = 60\nbits = 8\nequals = 0\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("byte 8 of a payload of 8 bytes")));
+  EXPECT_THAT(
+      [] {
+        health_rule("id = 3\nfd = true\nlength = 64\nstart_bit = 500\nbits = 32\nequals = 0\n");
+      },
+      testing::ThrowsMessage<ConfigError>(HasSubstr("byte 66 of a payload of 64 bytes")));
+  EXPECT_THAT(
+      [] {
+        health_rule(
+            "id = 3\nlength = 8\nstart_bit = 0\ntype = \"float32\"\nbits = 16\nat_most = 80\n");
+      },
+      testing::ThrowsMessage<ConfigError>(HasSubstr("a float32 is 32 bits long")));
+  EXPECT_THAT([] { health_rule("id = 3\nlength = 8\nstart_bit = 0\nbits = 8\nnot = 256\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("255 is the nearest")));
+  EXPECT_TRUE(health_rule("id = 3\nfd = true\nlength = 64\nstart_bit = 480\nequals = 0\n").fd);
+}
+
+TEST(CanConfig, HealthIsEqualByCode) {
+  for (const int code : {0, 1, 3, 7, 250}) {
+    const HealthRule rule =
+        health_rule("id = 3\nlength = 8\nstart_bit = 0\nbits = 8\nscale = 0.1\nequals = " +
+                    std::to_string(0.1 * code) + "\n");
+    const Bytes payload{static_cast<std::uint8_t>(code), 0, 0, 0, 0, 0, 0, 0};
+    EXPECT_EQ(decode(payload, rule.signal), rule.value) << code;
+  }
+}
+
+TEST(CanConfig, RefusesFeedbackOutsideOfItsFrame) {
+  const auto feedback = [](const std::string& keys) {
+    const auto file = RigFile::parse("[sensor]\nid = 1\n" + keys, "rig.toml");
+    ConfigReader(std::nullopt, 2).feedback(Keys{file->section("sensor"), devices});
+  };
+  EXPECT_NO_THROW(feedback("start_bit = 48\n"));
+  EXPECT_THAT([&] { feedback("start_bit = 56\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("byte 8 of a payload of 8 bytes")));
+  EXPECT_THAT([&] { feedback("length = 4\nstart_bit = 24\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("byte 4 of a payload of 4 bytes")));
+}
+
+TEST(CanConfig, AnExpectedSignalIsExpectedInItsPageOfItsMessage) {
+  const std::string dbc = testing::TempDir() + "can_expected_pages.dbc";
+  std::ofstream(dbc) << "BO_ 256 Status: 8 X\n"
+                        " SG_ Page M : 0|8@1+ (1,0) [0|0] \"\" X\n"
+                        " SG_ State m1 : 8|8@1+ (1,0) [0|0] \"\" X\n"
+                        " SG_ Load m1 : 16|8@1+ (1,0) [0|0] \"\" X\n"
+                        " SG_ Heat m2 : 8|8@1+ (1,0) [0|0] \"\" X\n"
+                        "BO_ 257 Other: 8 X\n"
+                        " SG_ Z : 0|8@1+ (1,0) [0|0] \"\" X\n";
+  const auto expected = [&](const std::vector<std::string>& signals) {
+    std::string list;
+    for (const std::string& signal : signals)
+      list += (list.empty() ? "" : ", ") +
+              ("{ dbc = \"" + dbc + "\", signal = \"" + signal + "\", value = 8 }");
+    const auto file = RigFile::parse(
+        "[actuator]\nid = 1\nlength = 8\nstart_bit = 0\n[[actuator.arm]]\nname = \"x\"\nid = "
+        "2\nexpect = [" +
+            list + "]\n",
+        "rig.toml");
+    ConfigReader reader(std::nullopt, 2);
+    return reader.command(Keys{file->section("actuator"), devices}, 0.0).arm.at(0).expect->pattern;
+  };
+  Frame frame;
+  frame.id = 256;
+  frame.length = 8;
+  frame.data = {2, 8, 8};
+  EXPECT_FALSE(expected({"Status.State"}).matches(frame)) << "another page";
+  EXPECT_FALSE(expected({"Status.State", "Status.Load"}).matches(frame));
+  frame.data[0] = 1;
+  EXPECT_TRUE(expected({"Status.State"}).matches(frame));
+  EXPECT_TRUE(expected({"Status.State", "Status.Load"}).matches(frame));
+  const auto refuses = [&](const std::vector<std::string>& signals, const char* rule) {
+    EXPECT_THAT([&] { expected(signals); }, testing::ThrowsMessage<ConfigError>(HasSubstr(rule)));
+  };
+  refuses({"Other.Z", "Status.State"}, "is in another message than the signals before it");
+  refuses({"Status.State", "Status.Heat"}, "is in another page of the message");
+  refuses({}, "needs a signal at least");
 }
 
 TEST(CanConfig, TakesEveryPollAndOnlyPollsThatAskSomething) {
