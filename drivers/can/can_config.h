@@ -53,6 +53,7 @@ class ConfigReader {
                           const Signal& signal);
   Checksum checksum(const Keys& keys, std::size_t bytes) const;
   void require_bytes(const Keys& keys, std::string_view key, Pattern& pattern) const;
+  void require_node(const Keys& keys, Pattern& pattern) const;
   Frame released(const Keys& keys, Frame frame, bool by_name);
   static void check_neutral(const Keys& keys, const CommandSettings& settings);
   Pattern expected(const Keys& keys);
@@ -69,14 +70,23 @@ class ConfigReader {
   bool is_extended(const Keys& keys, std::string_view key, std::uint32_t id,
                    std::string_view step_key) const;
   std::uint64_t moved(const Keys& keys, std::uint32_t id, std::string_view step_key) const;
+  std::uint32_t index_in_frame(const Keys& keys) const;
+  std::uint32_t steps(const Keys& keys) const;
 
   // Who has `key`: the channel if it does, else the device it belongs to.
   const Keys& holder_of(std::string_view key, const Keys& keys) const {
     return keys.has(key) || !device_ ? keys : *device_;
   }
 
+  // Where the answers of the device come, if that is not told by its node.
+  void take_answer_id(const Keys& keys) {
+    answer_id_ =
+        static_cast<std::uint32_t>(holder_of("answer_id", keys).integer("answer_id", an_id, 0));
+  }
+
   std::optional<Keys> device_;
   std::uint32_t node_;
+  std::uint32_t answer_id_ = 0;  // of the channel that is being read
   std::map<std::string, Dbc> dbcs_;
 };
 

@@ -22,6 +22,14 @@ std::int64_t nanoseconds(double seconds) {
 
 Pattern ConfigReader::expected(const Keys& keys) {
   Pattern pattern;
+  if (keys.has("expect_answer")) {
+    if (!keys.at("expect_answer").flag("expect_answer", false) || keys.has("expect_id"))
+      keys.refuse("expect_answer", "is true, in place of expect_id, or left out");
+    pattern.id = answer_id_;
+    pattern.extended = answer_id_ > max_standard_id;
+    require_bytes(keys, "expect_bytes", pattern);
+    return pattern;
+  }
   if (keys.has("expect_id")) {
     const auto id = static_cast<std::uint32_t>(keys.integer("expect_id", an_id));
     pattern.extended = is_extended(keys, "expect_extended", id, "expect_node_step");
@@ -75,14 +83,16 @@ Step ConfigReader::step(const Keys& keys) {
   step.delay_ns = nanoseconds(keys.number("delay_s", {.min = 0.0, .max = 60.0}, 0.0));
   step.repeats =
       static_cast<std::uint32_t>(keys.integer("repeats", {.min = 1.0, .max = 1000.0}, 1));
-  if (keys.has("expect_id") || keys.has("expect")) {
+  if (keys.has("expect_id") || keys.has("expect_answer") || keys.has("expect")) {
     Expectation expectation;
     expectation.pattern = expected(keys);
+    require_node(keys, expectation.pattern);
     if (keys.has("refuse_bytes")) {
       expectation.refusal = Pattern{};
       expectation.refusal->id = expectation.pattern.id;
       expectation.refusal->extended = expectation.pattern.extended;
       require_bytes(keys, "refuse_bytes", *expectation.refusal);
+      require_node(keys, *expectation.refusal);
     }
     expectation.timeout_ns =
         nanoseconds(keys.number("timeout_s", {.min = 0.0, .max = 60.0, .open_min = true}, 0.5));
@@ -123,6 +133,7 @@ HealthRule ConfigReader::health(const Keys& keys) {
   const Place found = place(keys);
   rule.pattern = found.pattern;
   require_bytes(keys, "match_bytes", rule.pattern);
+  require_node(keys, rule.pattern);
   rule.signal = found.signal;
   rule.fd = found.frame.fd;
   check_received(keys, found.frame, rule.signal);
@@ -180,6 +191,7 @@ void ConfigReader::check_neutral(const Keys& keys, const CommandSettings& settin
 }
 
 CommandSettings ConfigReader::command(const Keys& keys, std::optional<double> neutral) {
+  take_answer_id(keys);
   const bool by_name = keys.has("signal");
   const std::string_view where = by_name ? "signal" : "start_bit";
   Place found = place(keys);
@@ -205,6 +217,7 @@ CommandSettings ConfigReader::command(const Keys& keys, std::optional<double> ne
 }
 
 FeedbackSettings ConfigReader::feedback(const Keys& keys) {
+  take_answer_id(keys);
   const Place found = place(keys);
   FeedbackSettings settings;
   settings.signal = found.signal;
@@ -212,6 +225,7 @@ FeedbackSettings ConfigReader::feedback(const Keys& keys) {
   settings.pattern.id_mask =
       static_cast<std::uint32_t>(keys.integer("id_mask", an_id, max_extended_id));
   require_bytes(keys, "match_bytes", settings.pattern);
+  require_node(keys, settings.pattern);
   check_received(keys, found.frame, settings.signal);
   settings.pattern.cover(settings.signal);
   settings.checksum = checksum(keys, std::max(found.frame.length, settings.pattern.minimum_length));

@@ -90,8 +90,8 @@ void Pattern::cover(const Signal& signal) noexcept {
 
 void Pattern::require_byte(std::size_t position, std::uint8_t byte,
                            std::uint8_t byte_mask) noexcept {
-  value[position] = byte;
-  mask[position] = byte_mask;
+  value[position] = static_cast<std::uint8_t>((value[position] & ~byte_mask) | (byte & byte_mask));
+  mask[position] = static_cast<std::uint8_t>(mask[position] | byte_mask);
   minimum_length = std::max(minimum_length, static_cast<std::uint8_t>(position + 1U));
 }
 

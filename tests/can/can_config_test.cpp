@@ -110,11 +110,68 @@ TEST(CanProfile, Gm6020IsBigEndianAndWraps) {
   const Profile gm("dji-gm6020.toml", 2);
   const CommandSettings current = gm.command("current");
   EXPECT_EQ(current.frame.id, 0x1FEu);
-  EXPECT_EQ(set_point(current, 1.5), (Bytes{0x20, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(set_point(current, 1.5), (Bytes{0, 0, 0x20, 0, 0, 0, 0, 0}));
   const FeedbackSettings angle = gm.feedback("angle");
   EXPECT_EQ(angle.pattern.id, 0x206u);
   EXPECT_NEAR(value_of(angle, {0x10, 0, 0, 0, 0, 0, 0, 0}), 3.141592653589793, 1e-12);
   EXPECT_NEAR(angle.signal.wrap_modulus, 6.283185307179586, 1e-12);
+}
+
+TEST(CanProfile, EveryGm6020HasItsWord) {
+  for (std::uint32_t node = 1; node <= 7; ++node) {
+    const Profile gm("dji-gm6020.toml", node);
+    Bytes words(8, 0);
+    words[(node - 1) % 4 * 2] = 0x20;
+    EXPECT_EQ(set_point(gm.command("current"), 1.5), words) << node;
+    EXPECT_EQ(gm.command("current").frame.id, node <= 4 ? 0x1FEu : 0x2FEu) << node;
+    EXPECT_EQ(gm.command("voltage").frame.id, node <= 4 ? 0x1FFu : 0x2FFu) << node;
+  }
+  const CommandSettings counted =
+      Laid("dji-gm6020.toml", "command", "current", "id = 0x2FE\nstart_bit = 23\n", 6).command();
+  EXPECT_EQ(counted.frame.id, 0x2FEu);
+  EXPECT_EQ(set_point(counted, 1.5), (Bytes{0, 0, 0x20, 0, 0, 0, 0, 0}));
+}
+
+TEST(CanProfile, MitDrivesOfOneAnswerIdentifierAreToldApart) {
+  for (const std::string name : {"mit-dm4310.toml", "mit-mini-cheetah.toml"}) {
+    const Profile mit(name, 1);
+    const CommandSettings torque = mit.command("torque");
+    Frame reply;
+    reply.length = 8;
+    for (const unsigned node : {1U, 2U}) {
+      reply.data[0] = static_cast<std::uint8_t>(name == "mit-dm4310.toml" ? 0x10 | node : node);
+      EXPECT_EQ(torque.arm.at(0).expect->pattern.matches(reply), node == 1) << name;
+      EXPECT_EQ(mit.feedback("position").pattern.matches(reply), node == 1) << name;
+      for (const HealthRule& rule : torque.health)
+        EXPECT_EQ(rule.pattern.matches(reply), node == 1) << name;
+    }
+  }
+  EXPECT_TRUE(Profile("mit-dm4310.toml", 0x21).feedback("position").pattern.matches([] {
+    Frame reply;
+    reply.length = 8;
+    reply.data[0] = 0x11;
+    return reply;
+  }()))
+      << "of a longer node the low half";
+}
+
+TEST(CanProfile, AMitDriveMayAnswerToAnyIdentifier) {
+  const std::string there = "answer_id = 0x11\n";
+  const CommandSettings torque = Laid("mit-dm4310.toml", "command", "torque", there, 5).command();
+  EXPECT_EQ(torque.frame.id, 5u);
+  EXPECT_EQ(torque.arm.at(0).frame->id, 5u);
+  EXPECT_EQ(torque.arm.at(0).expect->pattern.id, 0x11u);
+  EXPECT_EQ(torque.health.at(0).pattern.id, 0x11u);
+  const auto position = [](const std::string& keys) {
+    return Laid("mit-dm4310.toml", "feedback", "position", keys, 5).feedback().pattern.id;
+  };
+  EXPECT_EQ(position(there), 0x11u);
+  EXPECT_EQ(position("id = 0x12\n"), 0x12u);
+  EXPECT_EQ(Laid("mit-mini-cheetah.toml", "command", "torque", there, 5)
+                .command()
+                .arm.at(0)
+                .expect->pattern.id,
+            0x11u);
 }
 
 TEST(CanProfile, Cia402StartsByExpeditedSdoAndSyncsEveryTick) {
