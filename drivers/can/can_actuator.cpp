@@ -8,7 +8,7 @@ CanActuator::CanActuator(Bus& bus, CommandSettings settings)
     : bus_(bus),
       settings_(std::move(settings)),
       health_(bus, settings_.health),
-      next_keep_alive_ns_(settings_.keep_alive.size(), 0),
+      cycles_(settings_.keep_alive.size()),
       frame_(settings_.frame),
       released_frame_(settings_.released.value_or(settings_.frame)) {
   check(frame_);
@@ -69,7 +69,7 @@ Sample CanActuator::write(double command) noexcept {
   // A command that is no number must not leave the last one standing: neutral goes out instead.
   compose(std::isfinite(command) ? command : settings_.neutral);
   const std::int64_t now_ns = monotonic_ns();
-  last_result_ = bus_.send(frame_);
+  last_result_ = send_set_point();
   last_state_ = bus_.state();
   if (last_result_ == SendResult::sent) {
     held_.value = encoded_;
@@ -93,11 +93,25 @@ void CanActuator::compose(double command) noexcept {
   seal(frame_, settings_.checksum);
 }
 
+// A device that did not get its SYNC has not taken the set-point. The SYNC is for others, too: it
+// goes out whatever became of the set-point.
+SendResult CanActuator::send_set_point() noexcept {
+  SendResult result = bus_.send(frame_);
+  for (const KeepAlive& kept : settings_.keep_alive) {
+    if (kept.period_ns > 0) continue;
+    const SendResult sent = bus_.send(kept.frame);
+    if (result == SendResult::sent) result = sent;
+  }
+  return result;
+}
+
 void CanActuator::keep_alive(std::int64_t now_ns) noexcept {
-  for (std::size_t n = 0; n < settings_.keep_alive.size(); ++n) {
-    if (now_ns < next_keep_alive_ns_[n]) continue;
-    next_keep_alive_ns_[n] = now_ns + settings_.keep_alive[n].period_ns;
-    bus_.send(settings_.keep_alive[n].frame);
+  const std::int64_t tick_ns = last_write_ns_ != 0 ? now_ns - last_write_ns_ : 0;
+  last_write_ns_ = now_ns;
+  for (std::size_t n = 0; n < cycles_.size(); ++n) {
+    const KeepAlive& kept = settings_.keep_alive[n];
+    if (kept.period_ns > 0 && cycles_[n].is_due(now_ns, kept.period_ns, tick_ns))
+      bus_.send(kept.frame);
   }
 }
 

@@ -31,6 +31,22 @@ struct CommandSettings {
   std::vector<HealthRule> health;
 };
 
+// When a frame is due that goes out at its period, seen from a loop whose ticks are never quite on
+// time: half a tick early or late, but none left out and none too many.
+class Cycle {
+ public:
+  bool is_due(std::int64_t now_ns, std::int64_t period_ns,
+              std::int64_t tick_ns) noexcept SINERIG_NONBLOCKING {
+    if (now_ns + tick_ns / 2 < next_ns_) return false;
+    next_ns_ += period_ns;
+    if (next_ns_ <= now_ns) next_ns_ = now_ns + period_ns;
+    return true;
+  }
+
+ private:
+  std::int64_t next_ns_ = 0;
+};
+
 class CanActuator final : public Actuator {
  public:
   // Before Bus::start(). Throws std::invalid_argument for a frame or signal that cannot be.
@@ -44,8 +60,8 @@ class CanActuator final : public Actuator {
   void arm();
 
   // Sends the set-point once, never again. Fault::bus: it was dropped (queue full, bus-off, link
-  // down); the value is then what the device last took. Fault::device: its health is not what it
-  // must be.
+  // down), or what must come with it was; the value is then what the device last took.
+  // Fault::device: its health is not what it must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
   // Neutral command, in the frame that does not switch on, then the disarm list. What finds the
@@ -59,13 +75,15 @@ class CanActuator final : public Actuator {
 
  private:
   void compose(double command) noexcept SINERIG_NONBLOCKING;
+  SendResult send_set_point() noexcept SINERIG_NONBLOCKING;
   void keep_alive(std::int64_t now_ns) noexcept SINERIG_NONBLOCKING;
   bool send_neutral(Patience& patience) noexcept;
 
   Bus& bus_;
   CommandSettings settings_;
   Health health_;
-  std::vector<std::int64_t> next_keep_alive_ns_;
+  std::vector<Cycle> cycles_;  // of settings_.keep_alive
+  std::int64_t last_write_ns_ = 0;
   Frame frame_;
   double encoded_ = 0.0;  // what the bits in frame_ mean
   Frame released_frame_;

@@ -108,9 +108,13 @@ class CanDevice final : public Device {
       const BusCounters& seen = bus->counters();
       char text[256];
       std::snprintf(text, sizeof text,
-                    "can %s: %llu frames taken in, %llu overflowed, %llu with a wrong check sum, "
+                    "can %s: %llu frames sent, %llu dropped at a full queue, %llu at a dead bus; "
+                    "%llu taken in, %llu overflowed, %llu with a wrong check sum, "
                     "%llu error frames, %llu times bus-off",
-                    bus->interface().c_str(), static_cast<unsigned long long>(seen.received),
+                    bus->interface().c_str(), static_cast<unsigned long long>(seen.sent),
+                    static_cast<unsigned long long>(seen.dropped_full),
+                    static_cast<unsigned long long>(seen.dropped_dead),
+                    static_cast<unsigned long long>(seen.received),
                     static_cast<unsigned long long>(seen.overflows),
                     static_cast<unsigned long long>(seen.bad_checksums),
                     static_cast<unsigned long long>(seen.error_frames),

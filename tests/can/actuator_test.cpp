@@ -154,5 +154,90 @@ TEST_F(CanActuatorAlone, AMoteusIsStoppedByTheVeryFrameThatCarriesNeutral) {
             0.0);
 }
 
+// `sinerig check` opens a rig and arms nothing: an axis that somebody else holds keeps its mode.
+TEST_F(CanActuatorAlone, AnODriveThatIsOnlyLookedAtKeepsItsMode) {
+  wire.device = [](const Frame& frame) -> std::vector<Frame> {
+    if (frame.id != 0x67 || frame.data[0] != 8) return {};
+    return {frame_of(0x61, {0, 0, 0, 0, 8, 0, 0, 0})};
+  };
+  for (const char* command : {"torque", "velocity", "position"}) {
+    wire.sent.clear();
+    Bus bus("fake", false);
+    CanActuator actuator(bus, Profile("odrive.toml", 3).command(command));
+    const auto sent_ids = [&] {
+      std::vector<std::uint32_t> ids;
+      for (const Frame& frame : wire.sent) ids.push_back(frame.id);
+      return ids;
+    };
+    actuator.start();
+    EXPECT_THAT(sent_ids(), testing::ElementsAre(0x78u)) << "clear errors";
+    wire.sent.clear();
+    actuator.arm();
+    EXPECT_THAT(sent_ids(), testing::ElementsAre(testing::_, 0x6Bu, 0x67u))
+        << "neutral, mode, closed loop";
+  }
+}
+
+CommandSettings command_with(const std::vector<KeepAlive>& keep_alive) {
+  CommandSettings settings;
+  settings.frame = frame_of(0x0E, {0, 0});
+  settings.signal.length = 16;
+  settings.keep_alive = keep_alive;
+  return settings;
+}
+
+// A tick is up to 50 µs late: of a period of one tick none may be left out.
+TEST_F(CanActuatorAlone, KeepAliveFramesKeepTheirPeriodOnTicksThatJitter) {
+  constexpr std::int64_t tick_ns = 10'000'000;
+  constexpr int ticks = 10'000;
+  for (const std::int64_t ticks_per_period : {1, 2, 5}) {
+    wire = FakeBus{};
+    Bus bus("fake", false);
+    CanActuator actuator(bus, command_with({{frame_of(0x700, {5}), ticks_per_period * tick_ns}}));
+    std::int64_t last_ns = 0;
+    std::int64_t longest_ns = 0;
+    int count = 0;
+    for (int tick = 0; tick < ticks; ++tick) {
+      wire.now_ns = 1'000'000'000 + tick * tick_ns + tick * 7919 % 101 * 1000 - 50'000;
+      wire.sent.clear();
+      actuator.write(0.0);
+      if (wire.sent.back().id != 0x700) continue;
+      if (last_ns != 0) longest_ns = std::max(longest_ns, wire.now_ns - last_ns);
+      last_ns = wire.now_ns;
+      ++count;
+    }
+    EXPECT_EQ(count, ticks / ticks_per_period);
+    EXPECT_LE(longest_ns, ticks_per_period * tick_ns + 100'000);
+  }
+}
+
+TEST_F(CanActuatorAlone, AfterAPauseKeepAliveFramesAreNotMadeUpFor) {
+  Bus bus("fake", false);
+  CanActuator actuator(bus, command_with({{frame_of(0x700, {5}), 10'000'000}}));
+  actuator.write(0.0);
+  wire.now_ns += 5'000'000'000;
+  wire.sent.clear();
+  for (int tick = 0; tick < 10; ++tick) {
+    actuator.write(0.0);
+    wire.now_ns += 1'000'000;
+  }
+  EXPECT_LE(wire.sent.size(), 10u + 2u);
+}
+
+TEST_F(CanActuatorAlone, ASetPointWithoutItsSyncIsNotApplied) {
+  Bus bus("fake", false);
+  CanActuator actuator(bus, command_with({{frame_of(0x80, {}), 0}}));
+  EXPECT_EQ(actuator.write(1.0).fault, Fault::none);
+  wire.refuses = [](const Frame& frame) {
+    return frame.id == 0x80 ? SendResult::queue_full : SendResult::sent;
+  };
+  const Sample lost = actuator.write(2.0);
+  EXPECT_EQ(lost.fault, Fault::bus);
+  EXPECT_EQ(lost.value, 1.0);
+  EXPECT_THAT(actuator.reason(), testing::HasSubstr("the transmit queue is full"));
+  wire.refuses = {};
+  EXPECT_EQ(actuator.write(3.0).value, 3.0);
+}
+
 }  // namespace
 }  // namespace sinerig::can

@@ -58,13 +58,15 @@ TEST(CanProfile, ODriveTorqueIsAFloatOfTheNodesMessage) {
   const CommandSettings torque = odrive.command("torque");
   EXPECT_EQ(torque.frame.id, 3u * 32u + 14u);
   EXPECT_EQ(set_point(torque, -1.5), (Bytes{0, 0, 0xC0, 0xBF, 0, 0, 0, 0}));
-  ASSERT_EQ(torque.startup.size(), 2u);
+  ASSERT_EQ(torque.startup.size(), 1u);
   EXPECT_EQ(torque.startup[0].frame->id, 3u * 32u + 24u);
   EXPECT_EQ(torque.startup[0].frame->length, 0);
-  EXPECT_EQ(bytes_of(*torque.startup[1].frame), (Bytes{1, 0, 0, 0, 1, 0, 0, 0}));
-  ASSERT_EQ(torque.arm.size(), 1u);
-  EXPECT_EQ(bytes_of(*torque.arm[0].frame), (Bytes{8, 0, 0, 0, 0, 0, 0, 0}));
-  EXPECT_EQ(torque.arm[0].expect->pattern.id, 3u * 32u + 1u);
+  ASSERT_EQ(torque.arm.size(), 2u);
+  EXPECT_EQ(bytes_of(*torque.arm[0].frame), (Bytes{1, 0, 0, 0, 1, 0, 0, 0}));
+  EXPECT_EQ(bytes_of(*torque.arm[1].frame), (Bytes{8, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(torque.arm[1].expect->pattern.id, 3u * 32u + 1u);
+  EXPECT_EQ(odrive.command("velocity").arm.at(0).frame->data[0], 2);
+  EXPECT_EQ(odrive.command("position").arm.at(0).frame->data[0], 3);
   EXPECT_EQ(torque.health.size(), 2u);
   // A quarter turn.
   EXPECT_DOUBLE_EQ(value_of(odrive.feedback("position"), {0, 0, 0x80, 0x3E, 0, 0, 0, 0}),
@@ -274,8 +276,7 @@ TEST(CanProfile, ListsOfTheRigFollowThoseOfTheProfile) {
   const CommandSettings torque = odrive.reader().command(keys, 0.0);
   std::vector<std::string> names;
   for (const Step& step : torque.startup) names.push_back(step.name);
-  EXPECT_THAT(names,
-              testing::ElementsAre("clear errors", "torque control, direct input", "limits"));
+  EXPECT_THAT(names, testing::ElementsAre("clear errors", "limits"));
   EXPECT_EQ(torque.keep_alive.size(), 1u);
   EXPECT_EQ(torque.health.size(), 3u);
 }
