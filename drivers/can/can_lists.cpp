@@ -185,7 +185,7 @@ void ConfigReader::check_neutral(const Keys& keys, const CommandSettings& settin
   std::ostringstream rule;
   rule << "cannot carry the neutral command " << settings.neutral << ": " << held
        << " is the nearest that clamp_min, clamp_max, the DBC file's range and the bits allow";
-  for (const std::string_view key : {"clamp_min", "clamp_max", "signal"})
+  for (const std::string_view key : {held > settings.neutral ? "clamp_min" : "clamp_max", "signal"})
     if (keys.has(key)) keys.refuse(key, rule.str());
   keys.refuse("start_bit", rule.str());
 }

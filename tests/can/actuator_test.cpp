@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "drivers/can/can_actuator.h"
+#include "drivers/can/can_driver.h"
 #include "tests/can/fake_socket.h"
 #include "tests/can/shipped_profile.h"
 
@@ -237,6 +238,46 @@ TEST_F(CanActuatorAlone, ASetPointWithoutItsSyncIsNotApplied) {
   EXPECT_THAT(actuator.reason(), testing::HasSubstr("the transmit queue is full"));
   wire.refuses = {};
   EXPECT_EQ(actuator.write(3.0).value, 3.0);
+}
+
+// The whole device, as a rig file makes it.
+struct Opened {
+  config::Rig rig;
+  std::unique_ptr<Device> device;
+  VirtualClock clock{TickGrid{1000.0}};
+
+  explicit Opened(const std::string& actuator)
+      : rig(config::read_rig(config::RigFile::parse(
+            "[loop]\nrate_hz = 1000\n[sweep]\nstart_hz = 1\nstop_hz = 10\npoints = 3\n"
+            "amplitude = 0.1\n[limits]\n[sensor.s]\ndriver = \"sim\"\n[actuator]\n"
+            "driver = \"can\"\ninterface = \"fake\"\nid = 1\nlength = 8\nstart_bit = 0\n" +
+                actuator,
+            "rig.toml"))),
+        device(can_driver().configure({rig, &rig.actuator, {}})) {
+    device->open(clock);
+  }
+};
+
+TEST_F(CanActuatorAlone, HealthInAnFdFrameNeedsAnInterfaceThatTakesThem) {
+  const std::string rule = "[[actuator.health]]\nname = \"x\"\nid = 3\nstart_bit = 0\nequals = 0\n";
+  EXPECT_FALSE((Opened{rule}, wire.fd_frames));
+  EXPECT_TRUE((Opened{rule + "fd = true\n"}, wire.fd_frames));
+}
+
+TEST_F(CanActuatorAlone, RemarksTellWhatWasDropped) {
+  Opened opened("");
+  opened.device->actuator()->write(0.0);
+  for (const SendResult refused :
+       {SendResult::queue_full, SendResult::queue_full, SendResult::failed}) {
+    wire.refuses = [&](const Frame&) {
+      return refused;
+    };
+    opened.device->actuator()->write(0.0);
+  }
+  wire.refuses = {};
+  EXPECT_THAT(
+      opened.device->remarks().at(0).text,
+      testing::HasSubstr("can fake: 1 frames sent, 2 dropped at a full queue, 1 at a dead bus"));
 }
 
 }  // namespace

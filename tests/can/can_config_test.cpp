@@ -392,6 +392,8 @@ TEST(CanConfig, RefusesAClampThatNeutralDoesNotPass) {
       refusal(frame + "clamp_min = 10\nclamp_max = 20\n"),
       HasSubstr("rig.toml:5: [actuator] clamp_min = 10: cannot carry the neutral command 0: "
                 "10 is the nearest that clamp_min, clamp_max"));
+  EXPECT_THAT(refusal(frame + "type = \"int\"\nclamp_min = -20\nclamp_max = -10\n"),
+              HasSubstr("clamp_max = -10: cannot carry the neutral command 0: -10 is the nearest"));
   EXPECT_THAT(refusal(frame + "offset = 1\n"), HasSubstr("cannot carry the neutral command 0: 1 "));
   EXPECT_EQ(refusal(frame + "bits = 12\nrange = [-10, 10]\n"), "") << "half a code beside it";
 }

@@ -1,7 +1,5 @@
 #include "tests/can/fake_socket.h"
 
-#include <algorithm>
-
 #include <linux/can.h>
 
 namespace sinerig::can {
@@ -15,7 +13,9 @@ std::int64_t monotonic_ns() noexcept {
   return FakeBus::instance().now_ns;
 }
 
-Socket::Socket(const std::string& interface, bool /*fd_frames*/) : interface_(interface) {}
+Socket::Socket(const std::string& interface, bool fd_frames) : interface_(interface) {
+  FakeBus::instance().fd_frames = fd_frames;
+}
 
 Socket::~Socket() = default;
 

@@ -14,6 +14,7 @@ namespace sinerig::can {
 
 struct FakeBus {
   std::int64_t now_ns = 1'000'000'000;
+  bool fd_frames = false;  // asked for
   std::vector<Frame> sent;
   std::deque<Received> arrived;
   // What the device says to a frame.
