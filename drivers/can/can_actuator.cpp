@@ -8,12 +8,17 @@ CanActuator::CanActuator(Bus& bus, CommandSettings settings)
     : bus_(bus),
       settings_(std::move(settings)),
       health_(bus, settings_.health),
-      next_keep_alive_ns_(settings_.keep_alive.size(), 0),
-      frame_(settings_.frame) {
+      cycles_(settings_.keep_alive.size()),
+      frame_(settings_.frame),
+      released_frame_(settings_.released.value_or(settings_.frame)) {
   check(frame_);
   check(settings_.signal, frame_.length);
   check(settings_.checksum, frame_.length);
   compose(settings_.neutral);
+  check(released_frame_);
+  check(settings_.signal, released_frame_.length);
+  neutral_ = encode(released_frame_.payload(), settings_.signal, settings_.neutral);
+  seal(released_frame_, settings_.checksum);
   for (Sequence* list :
        {&settings_.startup, &settings_.arm, &settings_.disarm, &settings_.shutdown}) {
     for (Step& step : *list) {
@@ -64,7 +69,7 @@ Sample CanActuator::write(double command) noexcept {
   // A command that is no number must not leave the last one standing: neutral goes out instead.
   compose(std::isfinite(command) ? command : settings_.neutral);
   const std::int64_t now_ns = monotonic_ns();
-  last_result_ = bus_.send(frame_);
+  last_result_ = send_set_point();
   last_state_ = bus_.state();
   if (last_result_ == SendResult::sent) {
     held_.value = encoded_;
@@ -88,19 +93,33 @@ void CanActuator::compose(double command) noexcept {
   seal(frame_, settings_.checksum);
 }
 
+// A device that did not get its SYNC has not taken the set-point. The SYNC is for others, too: it
+// goes out whatever became of the set-point.
+SendResult CanActuator::send_set_point() noexcept {
+  SendResult result = bus_.send(frame_);
+  for (const KeepAlive& kept : settings_.keep_alive) {
+    if (kept.period_ns > 0) continue;
+    const SendResult sent = bus_.send(kept.frame);
+    if (result == SendResult::sent) result = sent;
+  }
+  return result;
+}
+
 void CanActuator::keep_alive(std::int64_t now_ns) noexcept {
-  for (std::size_t n = 0; n < settings_.keep_alive.size(); ++n) {
-    if (now_ns < next_keep_alive_ns_[n]) continue;
-    next_keep_alive_ns_[n] = now_ns + settings_.keep_alive[n].period_ns;
-    bus_.send(settings_.keep_alive[n].frame);
+  const std::int64_t tick_ns = last_write_ns_ != 0 ? now_ns - last_write_ns_ : 0;
+  last_write_ns_ = now_ns;
+  for (std::size_t n = 0; n < cycles_.size(); ++n) {
+    const KeepAlive& kept = settings_.keep_alive[n];
+    if (kept.period_ns > 0 && cycles_[n].is_due(now_ns, kept.period_ns, tick_ns))
+      bus_.send(kept.frame);
   }
 }
 
-// A device may take a set-point only with the SYNC that comes with every one.
+// A device may take a set-point only with the SYNC that comes with every one. The set-points of the
+// loop may switch it on, which a release must not, in whatever state it finds the device.
 bool CanActuator::send_neutral(Patience& patience) noexcept {
-  compose(settings_.neutral);
-  bool all = send_surely(bus_, frame_, patience) == SendResult::sent;
-  if (all) held_.value = encoded_;
+  bool all = send_surely(bus_, released_frame_, patience) == SendResult::sent;
+  if (all) held_.value = neutral_;
   for (const KeepAlive& kept : settings_.keep_alive) {
     if (kept.period_ns > 0) continue;
     all = send_surely(bus_, kept.frame, patience) == SendResult::sent && all;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,7 +18,8 @@ struct KeepAlive {
 };
 
 struct CommandSettings {
-  Frame frame;  // constant bytes and signals are in it already
+  Frame frame;                    // constant bytes and signals are in it already
+  std::optional<Frame> released;  // carries neutral to a device that is to be off; none: `frame`
   Signal signal;
   Checksum checksum;
   double neutral = 0.0;
@@ -27,6 +29,22 @@ struct CommandSettings {
   Sequence shutdown;  // when the rig is closed
   std::vector<KeepAlive> keep_alive;
   std::vector<HealthRule> health;
+};
+
+// When a frame is due that goes out at its period, seen from a loop whose ticks are never quite on
+// time: half a tick early or late, but none left out and none too many.
+class Cycle {
+ public:
+  bool is_due(std::int64_t now_ns, std::int64_t period_ns,
+              std::int64_t tick_ns) noexcept SINERIG_NONBLOCKING {
+    if (now_ns + tick_ns / 2 < next_ns_) return false;
+    next_ns_ += period_ns;
+    if (next_ns_ <= now_ns) next_ns_ = now_ns + period_ns;
+    return true;
+  }
+
+ private:
+  std::int64_t next_ns_ = 0;
 };
 
 class CanActuator final : public Actuator {
@@ -42,13 +60,13 @@ class CanActuator final : public Actuator {
   void arm();
 
   // Sends the set-point once, never again. Fault::bus: it was dropped (queue full, bus-off, link
-  // down); the value is then what the device last took. Fault::device: its health is not what it
-  // must be.
+  // down), or what must come with it was; the value is then what the device last took.
+  // Fault::device: its health is not what it must be.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
-  // Neutral command, then the disarm list. What finds the queue full is tried for 20 ms per frame,
-  // a dead bus for 0.3 s in all. What then has not gone out is tried again by the next release(),
-  // by start() and by the destructor.
+  // Neutral command, in the frame that does not switch on, then the disarm list. What finds the
+  // queue full is tried for 20 ms per frame, a dead bus for 0.3 s in all. What then has not gone
+  // out is tried again by the next release(), by start() and by the destructor.
   void release() noexcept override;
   bool released() const noexcept { return released_; }
 
@@ -57,15 +75,19 @@ class CanActuator final : public Actuator {
 
  private:
   void compose(double command) noexcept SINERIG_NONBLOCKING;
+  SendResult send_set_point() noexcept SINERIG_NONBLOCKING;
   void keep_alive(std::int64_t now_ns) noexcept SINERIG_NONBLOCKING;
   bool send_neutral(Patience& patience) noexcept;
 
   Bus& bus_;
   CommandSettings settings_;
   Health health_;
-  std::vector<std::int64_t> next_keep_alive_ns_;
+  std::vector<Cycle> cycles_;  // of settings_.keep_alive
+  std::int64_t last_write_ns_ = 0;
   Frame frame_;
   double encoded_ = 0.0;  // what the bits in frame_ mean
+  Frame released_frame_;
+  double neutral_ = 0.0;  // what the bits in released_frame_ mean
   Sample held_;
   const HealthRule* violated_ = nullptr;
   SendResult last_result_ = SendResult::sent;

@@ -1,6 +1,7 @@
 #include "drivers/can/can_config.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <filesystem>
 #include <sstream>
@@ -13,10 +14,31 @@ using config::any_number;
 using config::Range;
 using config::zero_or_more;
 
-constexpr Range a_byte{.min = 0.0, .max = 255.0};
 constexpr Range a_payload_position{.min = 0.0, .max = max_fd_bytes - 1};
 
+void convert_to_unit_of(const config::Section& section, Signal& signal) {
+  const double factor = section.number("unit_scale", any_number, 1.0);
+  if (factor == 0.0) section.refuse("unit_scale", "must not be 0");
+  signal.scale *= factor;
+  signal.offset *= factor;
+  signal.minimum *= factor;
+  signal.maximum *= factor;
+  if (factor < 0.0) std::swap(signal.minimum, signal.maximum);
+  signal.wrap_modulus *= std::abs(factor);
+  signal.minimum = section.number("clamp_min", any_number, signal.minimum);
+  signal.maximum = section.number("clamp_max", any_number, signal.maximum);
+  signal.wrap_modulus = section.number("wrap", zero_or_more, signal.wrap_modulus);
+}
+
 }  // namespace
+
+bool is_held(const Signal& signal, double value, double held) {
+  const bool is_float =
+      signal.encoding == Encoding::float32 || signal.encoding == Encoding::float64;
+  const double rounding = is_float ? 1e-6 * (std::abs(value) + std::abs(signal.offset))
+                                   : 0.500001 * std::abs(signal.scale);
+  return std::abs(held - value) <= rounding;
+}
 
 const Dbc& ConfigReader::dbc(const Keys& keys) {
   const Keys& holder = holder_of("dbc", keys);
@@ -43,7 +65,25 @@ bool ConfigReader::is_extended(const Keys& keys, std::string_view key, std::uint
 std::uint64_t ConfigReader::moved(const Keys& keys, std::uint32_t id,
                                   std::string_view step_key) const {
   const std::string_view given = keys.has(step_key) ? step_key : "node_step";
-  return id + static_cast<std::uint64_t>(holder_of(given, keys).integer(given, an_id, 0)) * node_;
+  return id +
+         static_cast<std::uint64_t>(holder_of(given, keys).integer(given, an_id, 0)) * steps(keys);
+}
+
+// A frame that holds the set-points of several nodes, from node 1 on: how many such frames this
+// node's is behind the first, and which place it has there. A rig file that gives the identifier or
+// the place itself has counted already.
+std::uint32_t ConfigReader::steps(const Keys& keys) const {
+  if (!keys.has("nodes_per_frame")) return node_;
+  const auto nodes =
+      static_cast<std::uint32_t>(keys.integer("nodes_per_frame", {.min = 1.0, .max = 64.0}));
+  return keys.over() && keys.over()->has("id") ? 0 : (std::max(node_, 1U) - 1U) / nodes;
+}
+
+std::uint32_t ConfigReader::index_in_frame(const Keys& keys) const {
+  if (!keys.has("nodes_per_frame")) return 0;
+  const auto nodes =
+      static_cast<std::uint32_t>(keys.integer("nodes_per_frame", {.min = 1.0, .max = 64.0}));
+  return keys.over() && keys.over()->has("start_bit") ? 0 : (std::max(node_, 1U) - 1U) % nodes;
 }
 
 std::uint32_t ConfigReader::shifted(const Keys& keys, std::string_view key, std::uint32_t id,
@@ -70,9 +110,14 @@ Frame ConfigReader::frame_of_message(const Keys& keys, const DbcMessage& message
 // A frame given in place: id, bytes or length, flags.
 Frame ConfigReader::frame(const Keys& keys) {
   Frame frame;
-  const auto id = static_cast<std::uint32_t>(keys.integer("id", an_id));
-  frame.extended = is_extended(keys, "extended", id, "node_step");
-  frame.id = shifted(keys, "id", id, frame.extended);
+  if (keys.at("answer").flag("answer", false)) {
+    frame.id = static_cast<std::uint32_t>(keys.integer("id", an_id, answer_id_));
+    frame.extended = keys.at("extended").flag("extended", frame.id > max_standard_id);
+  } else {
+    const auto id = static_cast<std::uint32_t>(keys.integer("id", an_id));
+    frame.extended = is_extended(keys, "extended", id, "node_step");
+    frame.id = shifted(keys, "id", id, frame.extended);
+  }
   frame.fd = keys.at("fd").flag("fd", false);
   frame.bit_rate_switch = frame.fd && keys.at("bit_rate_switch").flag("bit_rate_switch", false);
   frame.remote = keys.at("remote").flag("remote", false);
@@ -100,6 +145,10 @@ Signal ConfigReader::layout(const Keys& keys) const {
     signal.order = ByteOrder::motorola;
   signal.start_bit =
       static_cast<std::uint16_t>(keys.integer("start_bit", {.min = 0.0, .max = 511.0}));
+  if (keys.has("nodes_per_frame")) {
+    const std::int64_t apart = keys.integer("bits_per_node", {.min = 1.0, .max = 64.0});
+    signal.start_bit = static_cast<std::uint16_t>(signal.start_bit + apart * index_in_frame(keys));
+  }
   const std::int64_t usual_bits = type == "float64" ? 64 : type == "float32" ? 32 : 16;
   signal.length =
       static_cast<std::uint8_t>(keys.integer("bits", {.min = 1.0, .max = 64.0}, usual_bits));
@@ -116,18 +165,17 @@ Signal ConfigReader::layout(const Keys& keys) const {
   return signal;
 }
 
-// `unit_scale` turns the device's unit into the rig's; clamp and wrap are in the rig's.
+// `unit_scale` turns what the frame holds into the profile's unit and the rig's into the rig's: the
+// factors multiply. Clamps and wrap are in the unit of the file that gives them.
 void ConfigReader::convert_unit(const Keys& keys, Signal& signal) const {
-  const double factor = keys.number("unit_scale", any_number, 1.0);
-  if (factor == 0.0) keys.refuse("unit_scale", "must not be 0");
-  signal.scale *= factor;
-  signal.offset *= factor;
-  signal.minimum *= factor;
-  signal.maximum *= factor;
-  if (factor < 0.0) std::swap(signal.minimum, signal.maximum);
-  signal.minimum = keys.number("clamp_min", any_number, signal.minimum);
-  signal.maximum = keys.number("clamp_max", any_number, signal.maximum);
-  signal.wrap_modulus = keys.number("wrap", zero_or_more, 0.0);
+  convert_to_unit_of(keys.base(), signal);
+  if (!keys.over()) return;
+  const config::Section& rig = *keys.over();
+  if (rig.has("unit") && keys.base().has("unit") && !rig.has("unit_scale") &&
+      rig.text("unit") != keys.base().text("unit"))
+    rig.refuse("unit", "the profile's is \"" + keys.base().text("unit") +
+                           "\"; give unit_scale: how many of this unit are one of the profile's");
+  convert_to_unit_of(rig, signal);
 }
 
 ConfigReader::Place ConfigReader::place_by_name(const Keys& keys) {
@@ -175,21 +223,21 @@ void ConfigReader::fill(const Keys& keys, Frame& frame, bool by_name) {
       signal = layout(entry);
       at_key(entry, "start_bit", [&] { check(signal, frame.length); });
     }
-    put_value(entry, frame, signal);
+    put_value(entry, "value", frame, signal);
   }
 }
 
 // Rounded to the nearest code; one that is not near is a mistake, not a set-point to be clamped.
-void ConfigReader::put_value(const Keys& entry, Frame& frame, const Signal& signal) {
-  const double value = entry.at("value").number("value", any_number);
+double ConfigReader::put_value(const Keys& entry, std::string_view key, Frame& frame,
+                               const Signal& signal) {
+  const double value = entry.at(key).number(key, any_number);
   const double held = encode(frame.payload(), signal, value);
-  const bool is_float =
-      signal.encoding == Encoding::float32 || signal.encoding == Encoding::float64;
-  const double rounding = is_float ? 1e-6 * std::abs(value) : 0.500001 * std::abs(signal.scale);
-  if (std::abs(held - value) <= rounding) return;
-  std::ostringstream rule;
-  rule << "is outside what the signal can hold: " << held << " is the nearest";
-  entry.refuse("value", rule.str());
+  if (!is_held(signal, value, held)) {
+    std::ostringstream rule;
+    rule << "is outside what the signal can hold: " << held << " is the nearest";
+    entry.refuse(key, rule.str());
+  }
+  return held;
 }
 
 Checksum ConfigReader::checksum(const Keys& keys, std::size_t bytes) const {
@@ -223,6 +271,17 @@ void ConfigReader::require_bytes(const Keys& keys, std::string_view key, Pattern
     pattern.require_byte(static_cast<std::size_t>(row[0]), static_cast<std::uint8_t>(row[1]),
                          static_cast<std::uint8_t>(mask));
   }
+}
+
+// [position, mask]: the node, or as much of it as the mask takes, in a byte of the frame.
+void ConfigReader::require_node(const Keys& keys, Pattern& pattern) const {
+  if (!keys.has("match_node")) return;
+  const std::vector<double> given = keys.at("match_node").numbers("match_node", a_byte);
+  if (given.size() != 2 || given[0] >= static_cast<double>(max_fd_bytes) || given[1] == 0.0)
+    keys.refuse("match_node", "must be [position, mask]");
+  const auto mask = static_cast<std::uint8_t>(given[1]);
+  pattern.require_byte(static_cast<std::size_t>(given[0]),
+                       static_cast<std::uint8_t>(node_ << std::countr_zero(mask)), mask);
 }
 
 }  // namespace sinerig::can

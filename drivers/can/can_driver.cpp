@@ -108,9 +108,13 @@ class CanDevice final : public Device {
       const BusCounters& seen = bus->counters();
       char text[256];
       std::snprintf(text, sizeof text,
-                    "can %s: %llu frames taken in, %llu overflowed, %llu with a wrong check sum, "
+                    "can %s: %llu frames sent, %llu dropped at a full queue, %llu at a dead bus; "
+                    "%llu taken in, %llu overflowed, %llu with a wrong check sum, "
                     "%llu error frames, %llu times bus-off",
-                    bus->interface().c_str(), static_cast<unsigned long long>(seen.received),
+                    bus->interface().c_str(), static_cast<unsigned long long>(seen.sent),
+                    static_cast<unsigned long long>(seen.dropped_full),
+                    static_cast<unsigned long long>(seen.dropped_dead),
+                    static_cast<unsigned long long>(seen.received),
                     static_cast<unsigned long long>(seen.overflows),
                     static_cast<unsigned long long>(seen.bad_checksums),
                     static_cast<unsigned long long>(seen.error_frames),
@@ -141,7 +145,8 @@ class CanDevice final : public Device {
     return settings.frame.fd || has_fd(settings.startup) || has_fd(settings.arm) ||
            has_fd(settings.disarm) || has_fd(settings.shutdown) ||
            std::ranges::any_of(settings.keep_alive,
-                               [](const KeepAlive& kept) { return kept.frame.fd; });
+                               [](const KeepAlive& kept) { return kept.frame.fd; }) ||
+           std::ranges::any_of(settings.health, &HealthRule::fd);
   }
 
   std::size_t interface_of(const Section& section, bool fd) {
@@ -188,7 +193,7 @@ class CanDevice final : public Device {
     ConfigReader reader{Keys{device, profile.folder}, 0};
     for (const Section& command : profile.file->children("command")) {
       command.text("unit");
-      reader.command(Keys{command, profile.folder}, 0.0);
+      reader.command(Keys{command, profile.folder}, std::nullopt);
     }
     for (const Section& feedback : profile.file->children("feedback")) {
       feedback.text("unit");

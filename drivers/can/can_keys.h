@@ -58,6 +58,10 @@ class Keys {
       tables.emplace_back(table, over_folder_);
     return tables;
   }
+  // The profile's section, or the only one; the rig's above it, where there is one.
+  const config::Section& base() const { return base_; }
+  const std::optional<config::Section>& over() const { return over_; }
+
   [[noreturn]] void refuse(std::string_view key, std::string_view rule) const {
     at(key).refuse(key, rule);
   }

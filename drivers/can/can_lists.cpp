@@ -2,6 +2,8 @@
 // keep-alive; and the channel as a whole.
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <sstream>
 #include <utility>
 
 #include "drivers/can/can_config.h"
@@ -20,6 +22,14 @@ std::int64_t nanoseconds(double seconds) {
 
 Pattern ConfigReader::expected(const Keys& keys) {
   Pattern pattern;
+  if (keys.has("expect_answer")) {
+    if (!keys.at("expect_answer").flag("expect_answer", false) || keys.has("expect_id"))
+      keys.refuse("expect_answer", "is true, in place of expect_id, or left out");
+    pattern.id = answer_id_;
+    pattern.extended = answer_id_ > max_standard_id;
+    require_bytes(keys, "expect_bytes", pattern);
+    return pattern;
+  }
   if (keys.has("expect_id")) {
     const auto id = static_cast<std::uint32_t>(keys.integer("expect_id", an_id));
     pattern.extended = is_extended(keys, "expect_extended", id, "expect_node_step");
@@ -27,13 +37,22 @@ Pattern ConfigReader::expected(const Keys& keys) {
     require_bytes(keys, "expect_bytes", pattern);
     return pattern;
   }
-  for (const Keys& entry : keys.tables("expect")) {
+  const std::vector<Keys> entries = keys.tables("expect");
+  if (entries.empty()) keys.refuse("expect", "needs a signal at least");
+  for (const Keys& entry : entries) {
     const Place found = place_by_name(entry);
-    pattern.id = found.frame.id;
-    pattern.extended = found.frame.extended;
+    if (&entry == &entries.front()) {
+      pattern = found.pattern;
+      pattern.id = found.frame.id;
+      pattern.extended = found.frame.extended;
+    } else if (found.frame.id != pattern.id || found.frame.extended != pattern.extended) {
+      entry.refuse("signal", "is in another message than the signals before it");
+    } else if (!pattern.join(found.pattern)) {
+      entry.refuse("signal", "is in another page of the message than the signals before it");
+    }
     Frame scratch;
     scratch.length = max_fd_bytes;
-    put_value(entry, scratch, found.signal);
+    put_value(entry, "value", scratch, found.signal);
     pattern.require(found.signal, extract_raw(scratch.payload(), found.signal));
   }
   return pattern;
@@ -64,14 +83,16 @@ Step ConfigReader::step(const Keys& keys) {
   step.delay_ns = nanoseconds(keys.number("delay_s", {.min = 0.0, .max = 60.0}, 0.0));
   step.repeats =
       static_cast<std::uint32_t>(keys.integer("repeats", {.min = 1.0, .max = 1000.0}, 1));
-  if (keys.has("expect_id") || keys.has("expect")) {
+  if (keys.has("expect_id") || keys.has("expect_answer") || keys.has("expect")) {
     Expectation expectation;
     expectation.pattern = expected(keys);
+    require_node(keys, expectation.pattern);
     if (keys.has("refuse_bytes")) {
       expectation.refusal = Pattern{};
       expectation.refusal->id = expectation.pattern.id;
       expectation.refusal->extended = expectation.pattern.extended;
       require_bytes(keys, "refuse_bytes", *expectation.refusal);
+      require_node(keys, *expectation.refusal);
     }
     expectation.timeout_ns =
         nanoseconds(keys.number("timeout_s", {.min = 0.0, .max = 60.0, .open_min = true}, 0.5));
@@ -89,13 +110,33 @@ Sequence ConfigReader::sequence(const Keys& keys, std::string_view list) {
   return sequence;
 }
 
+// Every bit that is read must come: in a payload of the length given, else in the longest there is.
+void ConfigReader::check_received(const Keys& keys, const Frame& frame, const Signal& signal) {
+  const std::size_t longest = frame.fd ? max_fd_bytes : max_classic_bytes;
+  const std::size_t bytes = frame.length > 0 ? frame.length : longest;
+  at_key(keys, keys.has("signal") ? "signal" : "start_bit", [&] { check(signal, bytes); });
+}
+
+// What decode() makes of the code that stands for a number: 3 · 0.1 is not 0.3. A device may send
+// what is outside of the range that its DBC file tells.
+double ConfigReader::value_of_code(const Keys& keys, std::string_view key, Signal signal) {
+  signal.minimum = -std::numeric_limits<double>::infinity();
+  signal.maximum = std::numeric_limits<double>::infinity();
+  Frame scratch;
+  scratch.length = max_fd_bytes;
+  return put_value(keys, key, scratch, signal);
+}
+
 HealthRule ConfigReader::health(const Keys& keys) {
   HealthRule rule;
   rule.name = keys.at("name").text("name");
   const Place found = place(keys);
   rule.pattern = found.pattern;
   require_bytes(keys, "match_bytes", rule.pattern);
+  require_node(keys, rule.pattern);
   rule.signal = found.signal;
+  rule.fd = found.frame.fd;
+  check_received(keys, found.frame, rule.signal);
   using Operator = HealthRule::Operator;
   const std::pair<const char*, Operator> operators[] = {{"equals", Operator::equal},
                                                         {"not", Operator::not_equal},
@@ -106,7 +147,9 @@ HealthRule ConfigReader::health(const Keys& keys) {
     if (!keys.has(key)) continue;
     ++given;
     rule.comparison = comparison;
-    rule.value = keys.at(key).number(key, any_number);
+    const bool by_code = comparison == Operator::equal || comparison == Operator::not_equal;
+    rule.value =
+        by_code ? value_of_code(keys, key, found.signal) : keys.at(key).number(key, any_number);
   }
   if (given != 1) keys.refuse("name", "needs exactly one of equals, not, at_most, at_least");
   rule.max_age_ns = nanoseconds(keys.number("max_age_s", zero_or_more, 0.0));
@@ -123,7 +166,32 @@ void ConfigReader::watch(const Keys& keys, CommandSettings& settings) {
   for (const Keys& entry : keys.joined_tables("health")) settings.health.push_back(health(entry));
 }
 
-CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
+// The set-point's frame with other constant bytes.
+Frame ConfigReader::released(const Keys& keys, Frame frame, bool by_name) {
+  const std::vector<double> bytes = keys.at("release_bytes").numbers("release_bytes", a_byte);
+  if (by_name || bytes.size() != frame.length)
+    keys.refuse("release_bytes", "takes the place of bytes, and is as long as the frame");
+  std::ranges::transform(bytes, frame.data.begin(),
+                         [](double byte) { return static_cast<std::uint8_t>(byte); });
+  fill(keys, frame, by_name);
+  return frame;
+}
+
+// What is sent at every stop must not be the nearest thing that the clamp lets through.
+void ConfigReader::check_neutral(const Keys& keys, const CommandSettings& settings) {
+  Frame scratch = settings.frame;
+  const double held = encode(scratch.payload(), settings.signal, settings.neutral);
+  if (is_held(settings.signal, settings.neutral, held)) return;
+  std::ostringstream rule;
+  rule << "cannot carry the neutral command " << settings.neutral << ": " << held
+       << " is the nearest that clamp_min, clamp_max, the DBC file's range and the bits allow";
+  for (const std::string_view key : {held > settings.neutral ? "clamp_min" : "clamp_max", "signal"})
+    if (keys.has(key)) keys.refuse(key, rule.str());
+  keys.refuse("start_bit", rule.str());
+}
+
+CommandSettings ConfigReader::command(const Keys& keys, std::optional<double> neutral) {
+  take_answer_id(keys);
   const bool by_name = keys.has("signal");
   const std::string_view where = by_name ? "signal" : "start_bit";
   Place found = place(keys);
@@ -135,8 +203,10 @@ CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
     check(settings.frame);
     check(settings.signal, settings.frame.length);
   });
+  if (keys.has("release_bytes")) settings.released = released(keys, found.frame, by_name);
   settings.checksum = checksum(keys, settings.frame.length);
-  settings.neutral = neutral;
+  settings.neutral = neutral.value_or(0.0);
+  if (neutral) check_neutral(keys, settings);
   settings.startup = sequence(keys, "startup");
   settings.arm = sequence(keys, "arm");
   settings.disarm = sequence(keys, "disarm");
@@ -147,6 +217,7 @@ CommandSettings ConfigReader::command(const Keys& keys, double neutral) {
 }
 
 FeedbackSettings ConfigReader::feedback(const Keys& keys) {
+  take_answer_id(keys);
   const Place found = place(keys);
   FeedbackSettings settings;
   settings.signal = found.signal;
@@ -154,9 +225,9 @@ FeedbackSettings ConfigReader::feedback(const Keys& keys) {
   settings.pattern.id_mask =
       static_cast<std::uint32_t>(keys.integer("id_mask", an_id, max_extended_id));
   require_bytes(keys, "match_bytes", settings.pattern);
+  require_node(keys, settings.pattern);
+  check_received(keys, found.frame, settings.signal);
   settings.pattern.cover(settings.signal);
-  at_key(keys, keys.has("signal") ? "signal" : "start_bit",
-         [&] { check(settings.signal, settings.pattern.minimum_length); });
   settings.checksum = checksum(keys, std::max(found.frame.length, settings.pattern.minimum_length));
   settings.fd = found.frame.fd;
   if (keys.has("invalid"))

@@ -73,14 +73,25 @@ void Pattern::require(const Signal& signal, std::uint64_t raw) noexcept {
   cover(signal);
 }
 
+bool Pattern::join(const Pattern& other) noexcept {
+  unsigned contrary = 0;
+  for (std::size_t n = 0; n < max_fd_bytes; ++n) {
+    contrary |= static_cast<unsigned>((value[n] ^ other.value[n]) & mask[n] & other.mask[n]);
+    value[n] = static_cast<std::uint8_t>((value[n] & mask[n]) | (other.value[n] & other.mask[n]));
+    mask[n] = static_cast<std::uint8_t>(mask[n] | other.mask[n]);
+  }
+  minimum_length = std::max(minimum_length, other.minimum_length);
+  return contrary == 0;
+}
+
 void Pattern::cover(const Signal& signal) noexcept {
   while (minimum_length < max_fd_bytes && !fits(signal, minimum_length)) ++minimum_length;
 }
 
 void Pattern::require_byte(std::size_t position, std::uint8_t byte,
                            std::uint8_t byte_mask) noexcept {
-  value[position] = byte;
-  mask[position] = byte_mask;
+  value[position] = static_cast<std::uint8_t>((value[position] & ~byte_mask) | (byte & byte_mask));
+  mask[position] = static_cast<std::uint8_t>(mask[position] | byte_mask);
   minimum_length = std::max(minimum_length, static_cast<std::uint8_t>(position + 1U));
 }
 

@@ -44,6 +44,9 @@ struct Pattern {
 
   // From now on the payload must have `raw` in the bits of `signal`.
   void require(const Signal& signal, std::uint64_t raw) noexcept;
+  // From now on the payload must have what that of `other` must; false where the two exclude each
+  // other.
+  bool join(const Pattern& other) noexcept;
   // From now on the payload must be long enough for `signal`.
   void cover(const Signal& signal) noexcept;
 

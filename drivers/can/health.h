@@ -18,7 +18,8 @@ struct HealthRule {
   Checksum checksum;
   Signal signal;
   Operator comparison = Operator::equal;
-  double value = 0.0;
+  double value = 0.0;           // to be equal to, or not: what decode() makes of its code
+  bool fd = false;              // comes in a CAN-FD frame
   std::int64_t max_age_ns = 0;  // of the newest frame; 0 = not watched
   std::size_t slot = 0;         // given by Health
 };

@@ -137,7 +137,10 @@ SendResult Socket::send(const Frame& frame) noexcept {
   const std::size_t size = frame.fd ? CANFD_MTU : CAN_MTU;
   const SystemCall never_waits;
   const ssize_t sent = ::send(fd_, &raw, size, MSG_DONTWAIT);
-  return sent == static_cast<ssize_t>(size) ? SendResult::sent : result_of(errno);
+  if (sent == static_cast<ssize_t>(size)) return SendResult::sent;
+  const SendResult result = result_of(errno);
+  if (result == SendResult::link_down || result == SendResult::gone) counter_fit_.restart();
+  return result;
 }
 
 ReceiveResult Socket::receive(Received& received) noexcept {
@@ -157,9 +160,10 @@ ReceiveResult Socket::receive(Received& received) noexcept {
   };
   const ssize_t size = receive_at_once();
   if (size < 0) {
-    if (errno == ENETDOWN) return ReceiveResult::link_down;
-    if (errno == ENODEV || errno == ENXIO) return ReceiveResult::gone;
-    return ReceiveResult::nothing;
+    const bool down = errno == ENETDOWN;
+    if (!down && errno != ENODEV && errno != ENXIO) return ReceiveResult::nothing;
+    counter_fit_.restart();
+    return down ? ReceiveResult::link_down : ReceiveResult::gone;
   }
   if (size != classic_mtu && size != fd_mtu) return ReceiveResult::nothing;
 
@@ -200,6 +204,7 @@ ReceiveResult Socket::receive(Received& received) noexcept {
 }
 
 bool Socket::rebind() noexcept {
+  counter_fit_.restart();
   const SystemCall never_waits;
   return bind_to(fd_, interface_) && apply_filters();
 }

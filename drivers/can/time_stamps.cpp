@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <ctime>
+#include <utility>
 
 namespace sinerig::can {
 namespace {
@@ -29,9 +29,7 @@ std::int64_t realtime_offset_ns() noexcept {
 
 std::int64_t CounterFit::to_monotonic(std::int64_t counter_ns, std::int64_t seen_ns) noexcept {
   const std::int64_t difference_ns = seen_ns - counter_ns;
-  const bool jumped = started_ && (counter_ns < last_counter_ns_ ||
-                                   std::abs(difference_ns - open_.difference_ns) > restart_ns);
-  if (jumped) restart();
+  if (started_ && is_new_counter(counter_ns, difference_ns)) restart();
   if (!started_) {
     started_ = true;
     open_since_ns_ = counter_ns;
@@ -51,9 +49,20 @@ std::int64_t CounterFit::to_monotonic(std::int64_t counter_ns, std::int64_t seen
     if (count_ < 2) fit();
   }
 
+  return std::min(counter_ns + difference_at(counter_ns), seen_ns);
+}
+
+std::int64_t CounterFit::difference_at(std::int64_t counter_ns) const noexcept {
   const double drifted = drift_ * static_cast<double>(counter_ns - reference_ns_);
-  const std::int64_t fitted_ns = counter_ns + base_ns_ + std::llround(drifted);
-  return std::min(fitted_ns, seen_ns);
+  return base_ns_ + std::llround(drifted);
+}
+
+bool CounterFit::is_new_counter(std::int64_t counter_ns, std::int64_t difference_ns) noexcept {
+  const std::int64_t late_ns = difference_ns - difference_at(counter_ns);
+  if (counter_ns < last_counter_ns_ || late_ns < -jump_ns) return true;
+  const bool was_late = std::exchange(late_, late_ns > jump_ns);
+  if (late_ && !was_late) late_since_ns_ = counter_ns;
+  return late_ && counter_ns - late_since_ns_ > busy_ns;
 }
 
 // Until two windows are closed there is no drift to speak of: the smallest difference so far

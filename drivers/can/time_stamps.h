@@ -24,6 +24,9 @@ class CounterFit {
   // stamp in CLOCK_MONOTONIC, never later than `seen_ns`.
   std::int64_t to_monotonic(std::int64_t counter_ns, std::int64_t seen_ns) noexcept;
 
+  // The counter is known to begin anew, as it does when the interface comes up.
+  void restart() noexcept { *this = CounterFit{}; }
+
  private:
   struct Minimum {
     std::int64_t counter_ns = 0;
@@ -31,16 +34,23 @@ class CounterFit {
   };
 
   void fit() noexcept;
-  void restart() noexcept { *this = CounterFit{}; }
+  bool is_new_counter(std::int64_t counter_ns, std::int64_t difference_ns) noexcept;
+  std::int64_t difference_at(std::int64_t counter_ns) const noexcept;
 
   static constexpr std::int64_t window_ns = 1'000'000'000;
-  static constexpr std::int64_t restart_ns = 1'000'000'000;  // a jump this large is a new counter
+  // Farther from the line than any drift takes it between two frames. No frame is seen early: that
+  // is a new counter at once. Frames that are all late for longer than the host can have been busy
+  // are one, too.
+  static constexpr std::int64_t jump_ns = 20'000'000;
+  static constexpr std::int64_t busy_ns = 200'000'000;
 
   std::array<Minimum, 16> minima_{};  // ring of closed windows
   std::size_t count_ = 0;
   Minimum open_{};
   std::int64_t open_since_ns_ = 0;
   std::int64_t last_counter_ns_ = 0;
+  std::int64_t late_since_ns_ = 0;  // counter of the first of the late frames, where the last was
+  bool late_ = false;
   bool started_ = false;
   std::int64_t reference_ns_ = 0;  // the line: difference = base + drift · (counter − reference)
   std::int64_t base_ns_ = 0;

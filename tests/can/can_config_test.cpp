@@ -1,6 +1,8 @@
 #include "drivers/can/can_config.h"
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
 #include <memory>
 #include <string>
 #include <utility>
@@ -9,6 +11,7 @@
 #include <gmock/gmock.h>
 
 #include "drivers/can/can_driver.h"
+#include "tests/can/shipped_profile.h"
 
 namespace sinerig::can {
 namespace {
@@ -19,33 +22,9 @@ using config::Section;
 using testing::HasSubstr;
 using Bytes = std::vector<std::uint8_t>;
 
-const std::string devices = std::string(SINERIG_SOURCE_DIR) + "/config/devices";
-
 Bytes bytes_of(const Frame& frame) {
   return {frame.data.begin(), frame.data.begin() + frame.length};
 }
-
-// The parts of a shipped profile, as a rig file with this node would have them.
-struct Profile {
-  std::unique_ptr<RigFile> file;
-  std::uint32_t node;
-
-  Profile(const std::string& name, std::uint32_t node_)
-      : file(RigFile::load(devices + "/" + name)), node(node_) {}
-
-  Keys part(const std::string& kind, const std::string& name) const {
-    for (const Section& section : file->children(kind))
-      if (section.name() == kind + "." + name) return Keys{section, devices};
-    throw std::out_of_range(kind + "." + name);
-  }
-  ConfigReader reader() const { return {Keys{file->section("device"), devices}, node}; }
-  CommandSettings command(const std::string& name) const {
-    return reader().command(part("command", name), 0.0);
-  }
-  FeedbackSettings feedback(const std::string& name) const {
-    return reader().feedback(part("feedback", name));
-  }
-};
 
 Bytes set_point(const CommandSettings& settings, double value) {
   Frame frame = settings.frame;
@@ -79,13 +58,15 @@ TEST(CanProfile, ODriveTorqueIsAFloatOfTheNodesMessage) {
   const CommandSettings torque = odrive.command("torque");
   EXPECT_EQ(torque.frame.id, 3u * 32u + 14u);
   EXPECT_EQ(set_point(torque, -1.5), (Bytes{0, 0, 0xC0, 0xBF, 0, 0, 0, 0}));
-  ASSERT_EQ(torque.startup.size(), 2u);
+  ASSERT_EQ(torque.startup.size(), 1u);
   EXPECT_EQ(torque.startup[0].frame->id, 3u * 32u + 24u);
   EXPECT_EQ(torque.startup[0].frame->length, 0);
-  EXPECT_EQ(bytes_of(*torque.startup[1].frame), (Bytes{1, 0, 0, 0, 1, 0, 0, 0}));
-  ASSERT_EQ(torque.arm.size(), 1u);
-  EXPECT_EQ(bytes_of(*torque.arm[0].frame), (Bytes{8, 0, 0, 0, 0, 0, 0, 0}));
-  EXPECT_EQ(torque.arm[0].expect->pattern.id, 3u * 32u + 1u);
+  ASSERT_EQ(torque.arm.size(), 2u);
+  EXPECT_EQ(bytes_of(*torque.arm[0].frame), (Bytes{1, 0, 0, 0, 1, 0, 0, 0}));
+  EXPECT_EQ(bytes_of(*torque.arm[1].frame), (Bytes{8, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(torque.arm[1].expect->pattern.id, 3u * 32u + 1u);
+  EXPECT_EQ(odrive.command("velocity").arm.at(0).frame->data[0], 2);
+  EXPECT_EQ(odrive.command("position").arm.at(0).frame->data[0], 3);
   EXPECT_EQ(torque.health.size(), 2u);
   // A quarter turn.
   EXPECT_DOUBLE_EQ(value_of(odrive.feedback("position"), {0, 0, 0x80, 0x3E, 0, 0, 0, 0}),
@@ -131,11 +112,68 @@ TEST(CanProfile, Gm6020IsBigEndianAndWraps) {
   const Profile gm("dji-gm6020.toml", 2);
   const CommandSettings current = gm.command("current");
   EXPECT_EQ(current.frame.id, 0x1FEu);
-  EXPECT_EQ(set_point(current, 1.5), (Bytes{0x20, 0, 0, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(set_point(current, 1.5), (Bytes{0, 0, 0x20, 0, 0, 0, 0, 0}));
   const FeedbackSettings angle = gm.feedback("angle");
   EXPECT_EQ(angle.pattern.id, 0x206u);
   EXPECT_NEAR(value_of(angle, {0x10, 0, 0, 0, 0, 0, 0, 0}), 3.141592653589793, 1e-12);
   EXPECT_NEAR(angle.signal.wrap_modulus, 6.283185307179586, 1e-12);
+}
+
+TEST(CanProfile, EveryGm6020HasItsWord) {
+  for (std::uint32_t node = 1; node <= 7; ++node) {
+    const Profile gm("dji-gm6020.toml", node);
+    Bytes words(8, 0);
+    words[(node - 1) % 4 * 2] = 0x20;
+    EXPECT_EQ(set_point(gm.command("current"), 1.5), words) << node;
+    EXPECT_EQ(gm.command("current").frame.id, node <= 4 ? 0x1FEu : 0x2FEu) << node;
+    EXPECT_EQ(gm.command("voltage").frame.id, node <= 4 ? 0x1FFu : 0x2FFu) << node;
+  }
+  const CommandSettings counted =
+      Laid("dji-gm6020.toml", "command", "current", "id = 0x2FE\nstart_bit = 23\n", 6).command();
+  EXPECT_EQ(counted.frame.id, 0x2FEu);
+  EXPECT_EQ(set_point(counted, 1.5), (Bytes{0, 0, 0x20, 0, 0, 0, 0, 0}));
+}
+
+TEST(CanProfile, MitDrivesOfOneAnswerIdentifierAreToldApart) {
+  for (const std::string name : {"mit-dm4310.toml", "mit-mini-cheetah.toml"}) {
+    const Profile mit(name, 1);
+    const CommandSettings torque = mit.command("torque");
+    Frame reply;
+    reply.length = 8;
+    for (const unsigned node : {1U, 2U}) {
+      reply.data[0] = static_cast<std::uint8_t>(name == "mit-dm4310.toml" ? 0x10 | node : node);
+      EXPECT_EQ(torque.arm.at(0).expect->pattern.matches(reply), node == 1) << name;
+      EXPECT_EQ(mit.feedback("position").pattern.matches(reply), node == 1) << name;
+      for (const HealthRule& rule : torque.health)
+        EXPECT_EQ(rule.pattern.matches(reply), node == 1) << name;
+    }
+  }
+  EXPECT_TRUE(Profile("mit-dm4310.toml", 0x21).feedback("position").pattern.matches([] {
+    Frame reply;
+    reply.length = 8;
+    reply.data[0] = 0x11;
+    return reply;
+  }()))
+      << "of a longer node the low half";
+}
+
+TEST(CanProfile, AMitDriveMayAnswerToAnyIdentifier) {
+  const std::string there = "answer_id = 0x11\n";
+  const CommandSettings torque = Laid("mit-dm4310.toml", "command", "torque", there, 5).command();
+  EXPECT_EQ(torque.frame.id, 5u);
+  EXPECT_EQ(torque.arm.at(0).frame->id, 5u);
+  EXPECT_EQ(torque.arm.at(0).expect->pattern.id, 0x11u);
+  EXPECT_EQ(torque.health.at(0).pattern.id, 0x11u);
+  const auto position = [](const std::string& keys) {
+    return Laid("mit-dm4310.toml", "feedback", "position", keys, 5).feedback().pattern.id;
+  };
+  EXPECT_EQ(position(there), 0x11u);
+  EXPECT_EQ(position("id = 0x12\n"), 0x12u);
+  EXPECT_EQ(Laid("mit-mini-cheetah.toml", "command", "torque", there, 5)
+                .command()
+                .arm.at(0)
+                .expect->pattern.id,
+            0x11u);
 }
 
 TEST(CanProfile, Cia402StartsByExpeditedSdoAndSyncsEveryTick) {
@@ -162,6 +200,21 @@ TEST(CanProfile, Cia402GetsItsNeutralSetPointRightBeforeOperationIsEnabled) {
       names.push_back(step.neutral ? "neutral" : step.name);
   EXPECT_THAT(names,
               testing::ElementsAre("NMT operational", "neutral", "controlword enable operation"));
+}
+
+TEST(CanProfile, Cia402IsWellOnlyInOperation) {
+  const CommandSettings torque = Profile("cia402.toml", 4).command("torque");
+  const auto is_well = [&](std::uint8_t statusword) {
+    const Bytes report{statusword, 0x02};
+    return std::ranges::all_of(torque.health, [&](const HealthRule& rule) {
+      return decode(report, rule.signal) == rule.value;
+    });
+  };
+  EXPECT_TRUE(is_well(0x37));
+  EXPECT_TRUE(is_well(0x27));
+  EXPECT_FALSE(is_well(0x07)) << "quick stop active";
+  EXPECT_FALSE(is_well(0x2F)) << "fault reaction active";
+  EXPECT_FALSE(is_well(0x33)) << "switched on";
 }
 
 // A drive's first answers say that it is stopped: health must not see them.
@@ -203,6 +256,8 @@ TEST(CanProfile, MiniCheetahIsBelievedWithoutAState) {
 TEST(CanProfile, TellWhatComesOnlyAsAnAnswer) {
   EXPECT_TRUE(Profile("moteus.toml", 1).feedback("torque").answers_command);
   EXPECT_TRUE(Profile("mit-dm4310.toml", 1).feedback("position").answers_command);
+  for (const char* name : {"position", "velocity", "torque"})
+    EXPECT_TRUE(Profile("cia402.toml", 1).feedback(name).answers_command) << "to a SYNC";
   EXPECT_TRUE(Profile("myactuator-rmd.toml", 1).feedback("velocity").answers_command);
   EXPECT_FALSE(Profile("myactuator-rmd.toml", 1).feedback("angle").answers_command) << "asked for";
   EXPECT_FALSE(Profile("odrive.toml", 1).feedback("position").answers_command);
@@ -221,10 +276,52 @@ TEST(CanProfile, ListsOfTheRigFollowThoseOfTheProfile) {
   const CommandSettings torque = odrive.reader().command(keys, 0.0);
   std::vector<std::string> names;
   for (const Step& step : torque.startup) names.push_back(step.name);
-  EXPECT_THAT(names,
-              testing::ElementsAre("clear errors", "torque control, direct input", "limits"));
+  EXPECT_THAT(names, testing::ElementsAre("clear errors", "limits"));
   EXPECT_EQ(torque.keep_alive.size(), 1u);
   EXPECT_EQ(torque.health.size(), 3u);
+}
+
+// 1 turn/s of the drive is 2π rad/s of the profile, and twice that of the rig.
+TEST(CanProfile, TheRigsUnitScaleIsAddedToThatOfTheProfile) {
+  const Laid velocity("odrive.toml", "command", "velocity", "unit_scale = 2\n");
+  EXPECT_EQ(set_point(velocity.command(), 12.566370614359172),
+            (Bytes{0, 0, 0x80, 0x3F, 0, 0, 0, 0}));
+  EXPECT_EQ(set_point(Laid("odrive.toml", "command", "velocity", "unit_scale = 1\n").command(),
+                      6.283185307179586),
+            (Bytes{0, 0, 0x80, 0x3F, 0, 0, 0, 0}));
+  const Laid turned("odrive.toml", "feedback", "position", "unit_scale = -1\n");
+  EXPECT_DOUBLE_EQ(value_of(turned.feedback(), {0, 0, 0x80, 0x3E, 0, 0, 0, 0}),
+                   -1.5707963267948966);
+}
+
+TEST(CanProfile, AnotherUnitThanThatOfTheProfileNeedsItsFactor) {
+  EXPECT_THAT([] { Laid("odrive.toml", "feedback", "position", "unit = \"deg\"\n").feedback(); },
+              testing::ThrowsMessage<ConfigError>(
+                  HasSubstr("rig.toml:2: [c] unit = 'deg': the profile's is \"rad\"; give "
+                            "unit_scale: how many of this unit are one of the profile's")));
+  EXPECT_NO_THROW(Laid("odrive.toml", "feedback", "position", "unit = \"deg\"\nunit_scale = 57.3\n")
+                      .feedback());
+  EXPECT_NO_THROW(Laid("odrive.toml", "feedback", "position", "unit = \"rad\"\n").feedback());
+}
+
+TEST(CanProfile, ClampAndWrapOfTheProfileFollowTheRigsUnit) {
+  const auto most = [](const CommandSettings& settings) {
+    Frame frame = settings.frame;
+    return encode(frame.payload(), settings.signal, 1e9);
+  };
+  const auto rmd = [](const std::string& keys) {
+    return Laid("myactuator-rmd.toml", "command", "current", keys).command();
+  };
+  EXPECT_NEAR(most(rmd("unit_scale = 0.1\n")), 2.0, 1e-9) << "20 A, in Nm";
+  EXPECT_NEAR(most(rmd("unit_scale = -0.1\nclamp_min = -1\n")), 2.0, 1e-9);
+  EXPECT_NEAR(most(rmd("unit_scale = 0.1\nclamp_max = 1.5\n")), 1.5, 1e-9) << "the rig's unit";
+  const CommandSettings gm =
+      Laid("dji-gm6020.toml", "command", "current", "unit_scale = 0.741\n").command();
+  EXPECT_NEAR(most(gm), 3.0 * 0.741, 1e-9);
+  EXPECT_EQ(set_point(gm, 1e9), (Bytes{0x40, 0, 0, 0, 0, 0, 0, 0})) << "full scale, 16384";
+  const FeedbackSettings degrees =
+      Laid("dji-gm6020.toml", "feedback", "angle", "unit_scale = -57.29577951308232\n").feedback();
+  EXPECT_NEAR(degrees.signal.wrap_modulus, 360.0, 1e-9);
 }
 
 TEST(CanProfile, EveryShippedProfileIsReadWholeByTheDriver) {
@@ -286,6 +383,117 @@ TEST(CanConfig, RefusesConstantsThatTheirBitsCannotHold) {
           "id = 1\nexpect = [{ dbc = \"odrive-cansimple.dbc\", signal = \"Heartbeat.Axis_State\", "
           "value = 300 }]\n"),
       HasSubstr("is outside what the signal can hold: 255"));
+}
+
+// What goes out at every stop.
+TEST(CanConfig, RefusesAClampThatNeutralDoesNotPass) {
+  const std::string frame = "id = 0x10\nlength = 8\nstart_bit = 0\n";
+  EXPECT_THAT(
+      refusal(frame + "clamp_min = 10\nclamp_max = 20\n"),
+      HasSubstr("rig.toml:5: [actuator] clamp_min = 10: cannot carry the neutral command 0: "
+                "10 is the nearest that clamp_min, clamp_max"));
+  EXPECT_THAT(refusal(frame + "type = \"int\"\nclamp_min = -20\nclamp_max = -10\n"),
+              HasSubstr("clamp_max = -10: cannot carry the neutral command 0: -10 is the nearest"));
+  EXPECT_THAT(refusal(frame + "offset = 1\n"), HasSubstr("cannot carry the neutral command 0: 1 "));
+  EXPECT_EQ(refusal(frame + "bits = 12\nrange = [-10, 10]\n"), "") << "half a code beside it";
+}
+
+TEST(CanConfig, ReleaseBytesAreThoseOfTheFrame) {
+  const std::string frame = "id = 0x10\nbytes = [1, 0, 0]\nstart_bit = 8\n";
+  EXPECT_EQ(refusal(frame + "release_bytes = [2, 0, 0]\n"), "");
+  EXPECT_THAT(refusal(frame + "release_bytes = [2, 0]\n"), HasSubstr("is as long as the frame"));
+}
+
+HealthRule health_rule(const std::string& keys) {
+  const auto file = RigFile::parse(
+      "[actuator]\nid = 0x10\nlength = 8\nstart_bit = 0\n[[actuator.health]]\nname = \"x\"\n" +
+          keys,
+      "rig.toml");
+  ConfigReader reader(std::nullopt, 2);
+  return reader.command(Keys{file->section("actuator"), devices}, 0.0).health.at(0);
+}
+
+TEST(CanConfig, RefusesHealthRulesThatCannotBeRead) {
+  EXPECT_THAT(
+      [] { health_rule("id = 3\nlength = 8\nstart_bit = 60\nbits = 8\nequals = 0\n"); },
+      testing::ThrowsMessage<ConfigError>(HasSubstr("start_bit = 60: signal at bits 60|8 Intel")));
+  EXPECT_THAT([] { health_rule("id = 3\nstart_bit = 60\nbits = 8\nequals = 0\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("byte 8 of a payload of 8 bytes")));
+  EXPECT_THAT(
+      [] {
+        health_rule("id = 3\nfd = true\nlength = 64\nstart_bit = 500\nbits = 32\nequals = 0\n");
+      },
+      testing::ThrowsMessage<ConfigError>(HasSubstr("byte 66 of a payload of 64 bytes")));
+  EXPECT_THAT(
+      [] {
+        health_rule(
+            "id = 3\nlength = 8\nstart_bit = 0\ntype = \"float32\"\nbits = 16\nat_most = 80\n");
+      },
+      testing::ThrowsMessage<ConfigError>(HasSubstr("a float32 is 32 bits long")));
+  EXPECT_THAT([] { health_rule("id = 3\nlength = 8\nstart_bit = 0\nbits = 8\nnot = 256\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("255 is the nearest")));
+  EXPECT_TRUE(health_rule("id = 3\nfd = true\nlength = 64\nstart_bit = 480\nequals = 0\n").fd);
+}
+
+TEST(CanConfig, HealthIsEqualByCode) {
+  for (const int code : {0, 1, 3, 7, 250}) {
+    const HealthRule rule =
+        health_rule("id = 3\nlength = 8\nstart_bit = 0\nbits = 8\nscale = 0.1\nequals = " +
+                    std::to_string(0.1 * code) + "\n");
+    const Bytes payload{static_cast<std::uint8_t>(code), 0, 0, 0, 0, 0, 0, 0};
+    EXPECT_EQ(decode(payload, rule.signal), rule.value) << code;
+  }
+}
+
+TEST(CanConfig, RefusesFeedbackOutsideOfItsFrame) {
+  const auto feedback = [](const std::string& keys) {
+    const auto file = RigFile::parse("[sensor]\nid = 1\n" + keys, "rig.toml");
+    ConfigReader(std::nullopt, 2).feedback(Keys{file->section("sensor"), devices});
+  };
+  EXPECT_NO_THROW(feedback("start_bit = 48\n"));
+  EXPECT_THAT([&] { feedback("start_bit = 56\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("byte 8 of a payload of 8 bytes")));
+  EXPECT_THAT([&] { feedback("length = 4\nstart_bit = 24\n"); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("byte 4 of a payload of 4 bytes")));
+}
+
+TEST(CanConfig, AnExpectedSignalIsExpectedInItsPageOfItsMessage) {
+  const std::string dbc = testing::TempDir() + "can_expected_pages.dbc";
+  std::ofstream(dbc) << "BO_ 256 Status: 8 X\n"
+                        " SG_ Page M : 0|8@1+ (1,0) [0|0] \"\" X\n"
+                        " SG_ State m1 : 8|8@1+ (1,0) [0|0] \"\" X\n"
+                        " SG_ Load m1 : 16|8@1+ (1,0) [0|0] \"\" X\n"
+                        " SG_ Heat m2 : 8|8@1+ (1,0) [0|0] \"\" X\n"
+                        "BO_ 257 Other: 8 X\n"
+                        " SG_ Z : 0|8@1+ (1,0) [0|0] \"\" X\n";
+  const auto expected = [&](const std::vector<std::string>& signals) {
+    std::string list;
+    for (const std::string& signal : signals)
+      list += (list.empty() ? "" : ", ") +
+              ("{ dbc = \"" + dbc + "\", signal = \"" + signal + "\", value = 8 }");
+    const auto file = RigFile::parse(
+        "[actuator]\nid = 1\nlength = 8\nstart_bit = 0\n[[actuator.arm]]\nname = \"x\"\nid = "
+        "2\nexpect = [" +
+            list + "]\n",
+        "rig.toml");
+    ConfigReader reader(std::nullopt, 2);
+    return reader.command(Keys{file->section("actuator"), devices}, 0.0).arm.at(0).expect->pattern;
+  };
+  Frame frame;
+  frame.id = 256;
+  frame.length = 8;
+  frame.data = {2, 8, 8};
+  EXPECT_FALSE(expected({"Status.State"}).matches(frame)) << "another page";
+  EXPECT_FALSE(expected({"Status.State", "Status.Load"}).matches(frame));
+  frame.data[0] = 1;
+  EXPECT_TRUE(expected({"Status.State"}).matches(frame));
+  EXPECT_TRUE(expected({"Status.State", "Status.Load"}).matches(frame));
+  const auto refuses = [&](const std::vector<std::string>& signals, const char* rule) {
+    EXPECT_THAT([&] { expected(signals); }, testing::ThrowsMessage<ConfigError>(HasSubstr(rule)));
+  };
+  refuses({"Other.Z", "Status.State"}, "is in another message than the signals before it");
+  refuses({"Status.State", "Status.Heat"}, "is in another page of the message");
+  refuses({}, "needs a signal at least");
 }
 
 TEST(CanConfig, TakesEveryPollAndOnlyPollsThatAskSomething) {
