@@ -44,8 +44,10 @@ constexpr double hidden_part = 0.5;
 constexpr std::size_t blocks_that_know_noise = 6;
 constexpr double noise_growth = 1.5;
 
-// Windows of fewer can't tell harmonics from a ringing transient.
+// Windows of fewer can't tell harmonics from a ringing transient; what they take in is allowed as
+// this multiple of the tolerance of settling.
 constexpr std::uint64_t blocks_that_know_harmonics = 2;
+constexpr double harmonics_part = 3.0;
 
 // The colour of the noise counts in the judgement of a shift once more degrees of freedom than
 // these are behind it; a transient colours the residual too.
@@ -169,7 +171,8 @@ bool Measurement::still(const Window& window) noexcept {
 bool Measurement::may_ring() const noexcept {
   for (std::size_t pair = 0; pair < pairs_.size(); ++pair) {
     const Result& first = result(pair, 0);
-    if (first.known && first.estimate.distortion > settling_tolerance()) return true;
+    if (first.known && first.estimate.distortion > harmonics_part * settling_tolerance())
+      return true;
   }
   return false;
 }
