@@ -3,6 +3,7 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <random>
 #include <utility>
 
 #include <gtest/gtest.h>
@@ -171,8 +172,10 @@ TEST(LostSamples, OfASlowSensorCostNoPointAndNoEvents) {
     state = 0.95 * state + 0.05 * command;
     return command;
   };
-  test::FakeSensor sensor{clock, [&](std::uint64_t tick) {
-                            return state + 1e-5 * static_cast<double>(tick * 7919 % 101);
+  std::mt19937 random{1};
+  std::normal_distribution<double> noise{0.0, 3e-4};
+  test::FakeSensor sensor{clock, [&](std::uint64_t /*tick*/) {
+                            return state + noise(random);
                           }};
   sensor.fault_at = [](std::uint64_t tick) {
     return tick % 10 == 0 ? Fault::none : Fault::stale;
@@ -188,7 +191,8 @@ TEST(LostSamples, OfASlowSensorCostNoPointAndNoEvents) {
   for (const Point& point : sink.points) {
     const std::complex<double> z =
         std::polar(1.0, 2.0 * std::numbers::pi * point.frequency_hz / rate_hz);
-    EXPECT_EQ(point.status, PointStatus::good) << point.frequency_hz;
+    EXPECT_EQ(point.status, PointStatus::good)
+        << point.frequency_hz << " Hz: " << to_string(point.reason);
     EXPECT_NEAR(std::abs(point.response * (1.0 - 0.95 / z) / 0.05), 1.0, 0.02)
         << point.frequency_hz;
   }
