@@ -52,7 +52,8 @@ TEST(HttpRequest, RefusesWhatIsNone) {
 // Any bytes at all: an answer, and nothing read that was not sent.
 TEST(HttpRequest, SurvivesRandomBytes) {
   std::mt19937_64 random{test::seed(7)};
-  const std::string alphabet{"GET /PSTHost:XinergTk-= HTP/1.0?&\r\n\r\n\0\x80\xff", 44};
+  using namespace std::string_literals;
+  const std::string alphabet = "GET /PSTHost:XinergTk-= HTP/1.0?&\r\n\r\n\0\x80\xff"s;
   for (std::uint64_t i = 0; i < test::count(20000); ++i) {
     std::string text = i % 2 == 0 ? "GET / HTTP/1.1\r\n" : "";
     for (std::size_t n = random() % 60; n > 0; --n) text += alphabet[random() % alphabet.size()];
