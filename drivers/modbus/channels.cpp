@@ -56,7 +56,7 @@ void require_pace(const Link& link, const Pace& pace) {
 
 ModbusActuator::ModbusActuator(Link& link, CommandSettings settings)
     : link_{link}, settings_{std::move(settings)}, violated_{no_rule} {
-  link_.command(settings_.place);
+  link_.command(settings_.place, settings_.neutral);
   for (const HealthRule& rule : settings_.health)
     health_fields_.push_back(link_.watch(rule.place, "[actuator] health, " + rule.name));
   health_.resize(settings_.health.size());
@@ -81,13 +81,16 @@ void ModbusActuator::start() {
 }
 
 // Neutral goes out before the drive is armed: one that finds a stale set-point would jump. A drive
-// may refuse it until it is armed, and then has none.
+// may refuse it until it is armed, and then has none. One that says nothing is not armed: what
+// switches it on would wait for it, and be carried out when nobody looks any more.
 void ModbusActuator::arm() {
   released_ = false;
   try {
     link_.idle([&](Transport& transport) {
-      write_number(transport, settings_.place, settings_.neutral, link_.settings().writing,
-                   monotonic_now_ns() + 500'000'000);
+      const Answer answer =
+          write_surely(transport, settings_.place, settings_.neutral, link_.settings().writing);
+      if (answer.outcome != Outcome::ok && answer.outcome != Outcome::exception)
+        throw std::runtime_error("neutral, before it is armed: " + transport.describe(answer));
       run(transport, settings_.arm, "arm", link_.waiting());
     });
     require_pace(link_, link_.try_out(settings_.neutral, trial_exchanges));

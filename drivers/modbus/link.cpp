@@ -65,9 +65,26 @@ void Link::serve_one() noexcept {
 void Link::reconnect_now_and_then() noexcept {
   const std::int64_t now_ns = monotonic_now_ns();
   if (now_ns < next_reconnect_ns_) return;
-  if (transport_.try_connect()) pause_ns_ = first_pause_ns;
+  if (connect_and_hear()) pause_ns_ = first_pause_ns;
   next_reconnect_ns_ = monotonic_now_ns() + pause_ns_;
   if (!transport_.connected()) pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
+}
+
+// Many a device that has stopped reading is still connected to by its system, and would carry out,
+// later, what it was sent. It gets set-points again when it has answered something harmless.
+bool Link::connect_and_hear() noexcept {
+  if (!transport_.try_connect()) return false;
+  if (settings_.connection.serial) return true;
+  const std::int64_t deadline_ns = monotonic_now_ns() + settings_.response_timeout_ns;
+  const Answer answer =
+      reading_plan_.questions.empty()
+          ? write_number(transport_, *command_, neutral_, settings_.writing, deadline_ns)
+          : transport_.ask(reading_plan_.questions.front(), deadline_ns, registers_);
+  if (answer.outcome != Outcome::timeout) return transport_.connected();
+  failure_ = answer;
+  has_failed_ = true;
+  transport_.give_up();
+  return false;
 }
 
 void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept {

@@ -118,6 +118,7 @@ void Link::open() {
 
 void Link::reconnect() {
   const std::scoped_lock lock{mutex_};
+  if (!settings_.connection.serial) transport_.give_up();
   if (transport_.connected() || transport_.try_connect()) return;
   throw std::runtime_error(settings_.connection.address() +
                            ": no connection; is the device powered and on the network?");
@@ -192,8 +193,11 @@ Link::Released Link::release(double neutral, const Sequence& disarm) noexcept {
     const Answer answer = write_number(transport_, *command_, neutral, settings_.writing,
                                        monotonic_now_ns() + release_answer_ns);
     released.neutral = answer.outcome == Outcome::ok;
+    // From here on nothing but neutral and the list is in the connection.
+    const bool silent = answer.outcome == Outcome::timeout;
+    if (n == 0 && silent && !settings_.connection.serial) transport_.give_up();
   }
-  released.disarmed = transport_.connected() && run_all(transport_, disarm, waiting_);
+  released.disarmed = run_all(transport_, disarm, waiting_);
   return released;
 }
 

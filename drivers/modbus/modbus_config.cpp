@@ -91,7 +91,7 @@ Step read_step(const Section& section, const Connection& connection) {
   Step step;
   step.name = section.text("name");
   step.place = read_source(section, connection);
-  step.single = connection.link.writing == Writing::single;
+  step.writing = connection.link.writing;
   if (section.has("value")) step.write = section.number("value", any_number);
   step.expect = read_comparison(section);
   step.timeout_ns =
@@ -99,7 +99,7 @@ Step read_step(const Section& section, const Connection& connection) {
   step.delay_ns = nanoseconds(section.number("delay_s", {.min = 0.0, .max = 60.0}, 0.0));
   if (step.write && step.place.table == Table::input)
     section.refuse("table", "input registers can't be written");
-  if (step.write && step.single && step.place.words() > 1)
+  if (step.write && step.writing == Writing::single && step.place.words() > 1)
     section.refuse("type", "function 6 writes one register; exchange = \"fc16\" writes more");
   return step;
 }

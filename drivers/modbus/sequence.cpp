@@ -36,24 +36,15 @@ bool done(const Answer& answer) noexcept {
   return answer.outcome == Outcome::ok || answer.outcome == Outcome::exception;
 }
 
-// Outside the loop a lost answer is worth a second try; a refusal is final.
-Answer write_surely(Transport& transport, const Step& step) noexcept {
-  Answer answer;
-  const Writing writing = step.single ? Writing::single : Writing::multiple;
-  for (int n = 0; n < 3; ++n) {
-    if (n > 0) std::this_thread::sleep_for(before_retry);
-    answer =
-        write_number(transport, step.place, *step.write, writing, monotonic_now_ns() + answer_ns);
-    if (done(answer) || !transport.connected()) break;
-  }
-  return answer;
+Answer write_step(Transport& transport, const Step& step) noexcept {
+  return write_surely(transport, step.place, *step.write, step.writing);
 }
 
 // Empty when the step was done, else what went wrong.
 std::string perform(Transport& transport, const Step& step, const Waiting& waiting) {
   waiting.go_on();
   if (step.write) {
-    const Answer answer = write_surely(transport, step);
+    const Answer answer = write_step(transport, step);
     if (answer.outcome != Outcome::ok) return transport.describe(answer);
   }
   if (step.expect) {
@@ -106,7 +97,28 @@ Answer write_number(Transport& transport, const Place& place, double value, Writ
   request.write_address = place.address;
   request.write_count = static_cast<std::uint16_t>(place.words());
   encode(request.words, place.format, value);
-  return transport.ask(request, deadline_ns, {});
+  const Answer answer = transport.ask(request, deadline_ns, {});
+  constexpr std::uint8_t illegal_function = 1;
+  const bool unknown = answer.outcome == Outcome::exception && answer.exception == illegal_function;
+  const bool has_another = writing == Writing::automatic || writing == Writing::write_and_read;
+  if (!unknown || !has_another) return answer;
+  // What the loop's commands are written by: a drive may have nothing else.
+  request.function = Function::write_and_read;
+  request.read_address = request.write_address;
+  request.read_count = request.write_count;
+  std::array<std::uint16_t, max_words> registers{};
+  return transport.ask(request, deadline_ns, registers);
+}
+
+Answer write_surely(Transport& transport, const Place& place, double value,
+                    Writing writing) noexcept {
+  Answer answer;
+  for (int n = 0; n < 3; ++n) {
+    if (n > 0) std::this_thread::sleep_for(before_retry);
+    answer = write_number(transport, place, value, writing, monotonic_now_ns() + answer_ns);
+    if (done(answer) || !transport.connected()) break;
+  }
+  return answer;
 }
 
 void run(Transport& transport, const Sequence& sequence, const std::string& list,
@@ -120,7 +132,8 @@ void run(Transport& transport, const Sequence& sequence, const std::string& list
 bool run_all(Transport& transport, const Sequence& sequence, const Waiting& waiting) noexcept {
   bool all = true;
   for (const Step& step : sequence) {
-    if (step.write) all = write_surely(transport, step).outcome == Outcome::ok && all;
+    if (!transport.connected() && !transport.try_connect()) return false;
+    if (step.write) all = write_step(transport, step).outcome == Outcome::ok && all;
     waiting.to_the_end().pause_for(step.delay_ns);
   }
   return all;

@@ -27,6 +27,10 @@ constexpr std::int64_t echo_quiet_ns = 50'000'000;
 // An answer that is this many time-outs late is taken for lost.
 constexpr std::int64_t latest_answer = 5;
 
+// Each waits in the connection to a device that has stopped reading, and is carried out when it
+// goes on. A single lost packet is made good for by the kernel once the next question follows it.
+constexpr int most_writes_waiting = 3;
+
 // libmodbus takes a timeout of 0 for a mistake, and one of a second or more in two parts.
 void set_response_timeout(modbus_t* context, std::int64_t timeout_ns) noexcept {
   const std::int64_t us = std::max<std::int64_t>(1, timeout_ns / 1000);
@@ -135,7 +139,20 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
     clear_input();
   }
   if (answer.outcome == Outcome::disconnected) disconnect();
+  const bool write_waits =
+      !settings_.serial && request.writes() && answer.outcome == Outcome::timeout;
+  if (write_waits && ++writes_waiting_ >= most_writes_waiting) give_up();
   return answer;
+}
+
+// An answer, whenever it comes, shows that everything before its question has been read.
+void Transport::note_answer(std::uint16_t number) noexcept {
+  const auto since = static_cast<std::uint16_t>(transaction_ - number);
+  const auto waiting = static_cast<std::uint16_t>(transaction_ - answered_);
+  if (since >= waiting) return;
+  answered_ = number;
+  // Those between it and the newest, which is being waited for.
+  writes_waiting_ = std::min(writes_waiting_, std::max(0, since - 1));
 }
 
 void Transport::receive(const Request& request, std::int64_t deadline_ns,
@@ -155,12 +172,14 @@ void Transport::receive(const Request& request, std::int64_t deadline_ns,
       const bool nonsense =
           errno == EMBBADCRC || errno == EMBBADDATA || errno == EMBBADEXC || errno == EMBMDATA;
       answer.outcome = nonsense ? Outcome::spoiled : Outcome::disconnected;
+      if (nonsense) note_answer(transaction_);
       return;
     }
     const auto size = static_cast<std::size_t>(length);
     if (size <= header + trailer) continue;  // another device's
-    const bool ours =
-        settings_.serial ? frame[0] == request.unit : (frame[0] << 8U | frame[1]) == transaction_;
+    const auto number = static_cast<std::uint16_t>(frame[0] << 8U | frame[1]);
+    if (!settings_.serial) note_answer(number);
+    const bool ours = settings_.serial ? frame[0] == request.unit : number == transaction_;
     const std::span<const std::uint8_t> pdu{frame.data() + header, size - header - trailer};
     const Reply reply = ours ? read_reply(pdu, request, registers) : Reply{};
     if (reply.kind == ReplyKind::other) {

@@ -74,14 +74,20 @@ class Transport {
   Transport(const Transport&) = delete;
   Transport& operator=(const Transport&) = delete;
 
-  // Throws std::runtime_error saying what to look at.
+  // Looks the host up; throws std::runtime_error saying what to look at.
   void connect();
+  // Again, at the address that connect() has found.
   bool try_connect() noexcept;
+  // What the device has not answered is dropped with the connection, see give_up().
   void disconnect() noexcept;
+  // TCP: whatever still waits to be delivered is thrown away (RST). Ended in the ordinary way, a
+  // connection delivers its set-points when the device reads again, seconds later.
+  void give_up() noexcept;
   bool connected() const noexcept { return connected_; }
 
   // Asks and waits until `deadline_ns` (CLOCK_MONOTONIC) at most; `registers` takes what is read.
-  // A lost connection is closed.
+  // A lost connection is closed; one of TCP is given up, too, after three writes that got no
+  // answer.
   Answer ask(const Request& request, std::int64_t deadline_ns,
              std::span<std::uint16_t> registers) noexcept;
 
@@ -106,6 +112,7 @@ class Transport {
 
   bool switch_transmitter() noexcept;
   bool send(const RequestBytes& request) noexcept;
+  void note_answer(std::uint16_t number) noexcept;
   void receive(const Request& request, std::int64_t deadline_ns, std::span<std::uint16_t> registers,
                Answer& answer) noexcept;
   bool discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept;
@@ -117,7 +124,10 @@ class Transport {
   ConnectionSettings settings_;
   std::unique_ptr<_modbus, Close> context_;
   TransportCounters counters_;
-  std::uint16_t transaction_ = 0;
+  std::string found_host_;         // its address, as connect() has found it
+  std::uint16_t transaction_ = 0;  // of the newest question, TCP
+  std::uint16_t answered_ = 0;     // newest question that got an answer, TCP
+  int writes_waiting_ = 0;         // for an answer, TCP
   std::int64_t usual_patience_ns_ = 0;
   bool connected_ = false;
   bool echoes_ = false;
