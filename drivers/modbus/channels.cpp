@@ -167,9 +167,17 @@ void ModbusActuator::look_after_health() noexcept {
 
 void ModbusActuator::release() noexcept {
   if (released_) return;
-  const Link::Released done = link_.release(settings_.neutral, settings_.disarm);
-  if (done.neutral) held_.value = settings_.neutral;
-  released_ = done.neutral && done.disarmed;
+  release_ = link_.release(settings_.neutral, settings_.disarm);
+  if (release_.neutral) held_.value = settings_.neutral;
+  released_ = release_.neutral && release_.disarmed;
+}
+
+std::string ModbusActuator::not_released() const {
+  if (released_) return "";
+  if (release_.neutral)
+    return "the drive has not taken all of its disarm list and may still be on: " +
+           link_.settings().connection.address();
+  return "the drive has not taken neutral and may still be on: " + link_.describe(release_.answer);
 }
 
 std::string ModbusActuator::reason() const {

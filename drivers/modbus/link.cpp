@@ -174,6 +174,11 @@ TransportCounters Link::counters() const {
   return transport_.counters();
 }
 
+std::string Link::describe(const Answer& answer) const {
+  const std::scoped_lock lock{mutex_};
+  return transport_.describe(answer);
+}
+
 std::string Link::last_failure() const {
   const std::scoped_lock lock{mutex_};
   return has_failed_ ? transport_.describe(failure_) : "";

@@ -69,6 +69,7 @@ class Link {
   // where the device does not know it and the rig file leaves the choice.
   Pace try_out(std::optional<double> command, std::size_t exchanges);
   std::string last_failure() const;
+  std::string describe(const Answer& answer) const;
   Pace pace() const;  // of the loop so far
   TransportCounters counters() const;
 
@@ -89,6 +90,7 @@ class Link {
   struct Released {
     bool neutral = false;   // taken by the device
     bool disarmed = false;  // every step was
+    Answer answer{};        // to neutral
   };
 
   // Neutral at once, whatever the loop has handed over, then `disarm`. Bounded in time. A

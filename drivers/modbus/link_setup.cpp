@@ -186,15 +186,18 @@ Link::Released Link::release(double neutral, const Sequence& disarm) noexcept {
   const std::scoped_lock lock{mutex_};
   drop_exchanges();
   commanded_ = false;
-  if (!command_) return {.neutral = true, .disarmed = true};
+  if (!command_) return {.neutral = true, .disarmed = true, .answer = {}};
   Released released;
   for (int n = 0; n < release_tries && !released.neutral; ++n) {
-    if (!transport_.connected() && !transport_.try_connect()) continue;
-    const Answer answer = write_number(transport_, *command_, neutral, settings_.writing,
-                                       monotonic_now_ns() + release_answer_ns);
-    released.neutral = answer.outcome == Outcome::ok;
+    if (!transport_.connected() && !transport_.try_connect()) {
+      released.answer = Answer{.error = errno};
+      continue;
+    }
+    released.answer = write_number(transport_, *command_, neutral, settings_.writing,
+                                   monotonic_now_ns() + release_answer_ns);
+    released.neutral = released.answer.outcome == Outcome::ok;
     // From here on nothing but neutral and the list is in the connection.
-    const bool silent = answer.outcome == Outcome::timeout;
+    const bool silent = released.answer.outcome == Outcome::timeout;
     if (n == 0 && silent && !settings_.connection.serial) transport_.give_up();
   }
   released.disarmed = run_all(transport_, disarm, waiting_);

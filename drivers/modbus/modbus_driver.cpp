@@ -77,6 +77,8 @@ class ModbusDevice final : public Device {
     if (actuator_) actuator_->release();
   }
 
+  std::string not_released() const override { return actuator_ ? actuator_->not_released() : ""; }
+
   void catch_up() override {
     for (const auto& link : links_) link->forget();
   }

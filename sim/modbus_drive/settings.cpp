@@ -54,6 +54,7 @@ DriveSettings read_drive(config::RigFile& file) {
   settings.torque_scale = drive.number("torque_scale", above_zero, 1.0);
   settings.position_scale = drive.number("position_scale", above_zero, 1.0);
   settings.velocity_scale = drive.number("velocity_scale", above_zero, 1.0);
+  settings.has_function_16 = drive.flag("function_16", true);
   settings.has_function_23 = drive.flag("function_23", true);
   settings.turn_around_ns =
       std::llround(drive.number("turn_around_s", {.min = 0.0, .max = 1.0}, 0.0) * 1e9);

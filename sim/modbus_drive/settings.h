@@ -40,6 +40,7 @@ struct DriveSettings {
   double torque_scale = 1.0;  // Nm per code, of every type
   double position_scale = 1.0;
   double velocity_scale = 1.0;
+  bool has_function_16 = true;
   bool has_function_23 = true;
   std::int64_t turn_around_ns = 0;  // from the end of a request to the beginning of its reply
   double watchdog_s = 0.0;          // without a request for this long the drive trips; 0 = never

@@ -110,6 +110,13 @@ void ConfiguredRig::keep_released() noexcept {
   for (Part& part : parts_) part.device->keep_released();
 }
 
+std::string ConfiguredRig::not_released() const {
+  for (const Part& part : parts_) {
+    if (std::string missing = part.device->not_released(); !missing.empty()) return missing;
+  }
+  return {};
+}
+
 std::string ConfiguredRig::arm_again() {
   try {
     switch_on([](Device& device) { device.rearm(); });

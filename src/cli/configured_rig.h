@@ -35,6 +35,7 @@ class ConfiguredRig final : public Rearm {
   std::string fault_reason() const override;
   std::string arm_again() override;
   void keep_released() noexcept override;
+  std::string not_released() const override;
   std::vector<Remark> remarks() const;
   bool answers_command(std::size_t sensor) const;  // Device::answers_command()
   Actuator& actuator() { return *actuator_; }

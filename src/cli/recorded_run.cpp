@@ -346,6 +346,10 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
              .reason = reason_of(played, outbox, configured),
              .sweep_file = writer->path(),
              .dropped_samples = rig.runner.record_samples ? outbox.dropped_samples() : 0};
+  if (const std::string missing = configured.not_released(); !missing.empty()) {
+    if (end.outcome == "done") end.outcome = "stopped";
+    end.reason += (end.reason.empty() ? "" : "; ") + missing;
+  }
   attended(service, for_at_most(most_desk_work), [&] {
     if (const std::string unsaid = put_down_end(*writer, end); !unsaid.empty()) {
       end.outcome = "stopped";

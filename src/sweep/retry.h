@@ -60,6 +60,9 @@ class Rearm {
   // While it is waited: a release that could not be carried out, on a dead bus, is tried again.
   virtual void keep_released() noexcept {}
 
+  // What the actuator has not taken of its last release, for people; empty where it is released.
+  virtual std::string not_released() const { return {}; }
+
   // Empty when all devices are armed; else why not, and nothing is: a stop request, too.
   virtual std::string arm_again() = 0;
 };

@@ -31,6 +31,7 @@ struct Witness {
   std::function<void(const Waiting&)> arming{};
   std::function<void(const Waiting&)> arming_again{};
   std::optional<std::uint64_t> faulty_tick{};
+  std::string not_released{};
 };
 
 // Moves its output on opening, and lets go of it at its end.
@@ -66,6 +67,7 @@ class FakeDevice final : public Device {
     parts.step();
     witness_.parts_when_caught_up = parts.integer(0);
   }
+  std::string not_released() const override { return witness_.not_released; }
   Actuator* actuator() noexcept override { return &*actuator_; }
   Sensor& sensor(std::size_t) noexcept override { return *sensor_; }
 
@@ -137,6 +139,22 @@ TEST_F(RunCommand, TellsTheDevicesToCatchUpOnceItsPartIsInTheFile) {
   Witness witness;
   EXPECT_EQ(run_command(options(rig("", 2)), {fake(witness)}), exit_done);
   EXPECT_EQ(witness.parts_when_caught_up, 1);
+}
+
+// All points are measured, and nobody may take the drive for harmless.
+TEST_F(RunCommand, SaysThatTheActuatorHasNotTakenItsRelease) {
+  Witness witness;
+  witness.not_released = "the drive has not taken neutral and may still be on: line: no answer";
+  EXPECT_EQ(run_command(options(rig("", 2)), {fake(witness)}), exit_stopped);
+  const record::StoredRun run = record::read_sweep(folder_ / "run.sweep");
+  EXPECT_EQ(run.fact("outcome"), "stopped");
+  EXPECT_EQ(run.fact("outcome_detail"), witness.not_released);
+  EXPECT_TRUE(std::none_of(run.events.begin(), run.events.end(),
+                           [](const auto& event) { return event.kind == "released"; }));
+  const auto told = std::find_if(run.events.begin(), run.events.end(),
+                                 [](const auto& event) { return event.kind == "not_released"; });
+  ASSERT_NE(told, run.events.end());
+  EXPECT_EQ(told->detail, witness.not_released);
 }
 
 TEST_F(RunCommand, ReleasesTheActuatorWhenTheDiskIsFull) {

@@ -320,6 +320,24 @@ TEST(ModbusRelease, ThatFindsNoConnectionIsTriedAgain) {
   expect_released();
 }
 
+// Released, and its lists written, by what its commands are written by.
+TEST(ModbusRelease, OfADriveThatKnowsNoFunctionBut23) {
+  sim::DriveSettings settings = drive_settings(false);
+  settings.has_function_16 = false;
+  Rig rig{settings};
+  for (Sequence* list : {&rig.settings.arm, &rig.settings.disarm})
+    for (Step& step : *list) step.writing = Writing::automatic;
+  rig.open();
+  rig.actuator->arm();
+  while (rig.tick(3.0).value != 3.0) {
+  }
+  rig.actuator->release();
+  EXPECT_TRUE(rig.actuator->released());
+  EXPECT_EQ(rig.actuator->not_released(), "");
+  EXPECT_EQ(number_in(rig.drive, number_at(16)), 0.0);
+  EXPECT_EQ(number_in(rig.drive, word_at(32)), 0.0);
+}
+
 TEST(ModbusRelease, IsNotDoneWhileTheDeviceRefusesToBeDisarmed) {
   Rig rig{drive_settings(false)};
   CommandSettings command = Rig::command();
@@ -330,6 +348,8 @@ TEST(ModbusRelease, IsNotDoneWhileTheDeviceRefusesToBeDisarmed) {
   rig.actuator->arm();
   rig.actuator->release();
   EXPECT_FALSE(rig.actuator->released());
+  EXPECT_THAT(rig.actuator->not_released(),
+              HasSubstr("has not taken all of its disarm list and may still be on: 127.0.0.1:"));
 }
 
 TEST(ModbusDeadline, NothingIsAskedWhenNobodyWaitsForTheAnswer) {

@@ -186,6 +186,8 @@ TEST_P(ModbusStall, LeavesFewSetPointsAndNoOrderToSwitchOnForADriveThatGoesOn) {
   drive_on(link, *actuator, 25);
   actuator->release();
   EXPECT_FALSE(actuator->released());
+  EXPECT_THAT(actuator->not_released(),
+              AllOf(HasSubstr("has not taken neutral"), HasSubstr("no answer in time")));
   link.reconnect();
   EXPECT_THAT([&] { actuator->arm(); },
               ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("neutral, before it is armed: "),
