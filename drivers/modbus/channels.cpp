@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::size_t no_rule = static_cast<std::size_t>(-1);
 constexpr std::size_t trial_exchanges = 100;
-constexpr double largest_part_of_period = 0.9;
 // Of the 100 that were asked; those withheld while a late answer may come don't count. A line that
 // loses 1 % is refused once in 1e8 trials, one that loses 5 % once in 85.
 constexpr double largest_failed_part = 0.10;
@@ -37,15 +36,22 @@ std::string obstacle(const Link& link, const Pace& pace) {
          << " exchanges failed: " << link.last_failure();
     return text.str();
   }
-  const double allowed_ns = largest_part_of_period * static_cast<double>(settings.period_ns);
-  if (static_cast<double>(pace.slow_ns) <= allowed_ns) return "";
-  const double most_hz = largest_part_of_period * 1e9 / static_cast<double>(pace.slow_ns);
-  const double rate_hz = 1e9 / static_cast<double>(settings.period_ns);
+  const auto period_ns = static_cast<double>(settings.period_ns);
+  const auto timeout_ns = static_cast<double>(settings.response_timeout_ns);
+  const auto slow_ns = static_cast<double>(pace.slow_ns);
+  const bool fits_the_period = slow_ns <= longest_timeout * period_ns;
+  if (fits_the_period && slow_ns <= timeout_ns) return "";
   text.precision(4);
   text << where << settings.connection.address() << ": an exchange takes "
        << milliseconds(pace.median_ns) << ", one in twenty more than " << milliseconds(pace.slow_ns)
-       << "; the loop at " << rate_hz << " Hz needs one every " << milliseconds(settings.period_ns)
-       << ": set [loop] rate_hz to " << std::floor(most_hz) << " at most";
+       << "; the loop at " << 1e9 / period_ns << " Hz needs one every "
+       << milliseconds(settings.period_ns);
+  if (fits_the_period)
+    text << " and gives it up after " << milliseconds(settings.response_timeout_ns);
+  // At the rate that is advised the usual time-out covers it.
+  text << ": set [loop] rate_hz to " << std::floor(usual_timeout * 1e9 / slow_ns) << " at most";
+  if (fits_the_period)
+    text << ", or response_timeout_s to " << std::ceil(slow_ns * 1e-4) * 1e-5 << " at least";
   return text.str();
 }
 
@@ -157,7 +163,8 @@ void ModbusActuator::look_after_health() noexcept {
     const bool unknown =
         settings_.max_age_ns > 0 && link_.tick_ns() - health_[n].time_ns > settings_.max_age_ns;
     const bool bad =
-        health_[n].fault == Fault::none && !settings_.health[n].comparison.holds(health_[n].value);
+        health_[n].fault == Fault::none &&
+        !settings_.health[n].comparison.holds(health_[n].value, settings_.health[n].place.format);
     if (violated_ == no_rule && (bad || unknown)) {
       violated_ = n;
       health_is_old_ = !bad;
@@ -181,6 +188,7 @@ std::string ModbusActuator::not_released() const {
 }
 
 std::string ModbusActuator::reason() const {
+  if (last_fault_ == Fault::none) return "";
   if (violated_ != no_rule) {
     const HealthRule& rule = settings_.health[violated_];
     std::ostringstream text;
@@ -191,7 +199,7 @@ std::string ModbusActuator::reason() const {
       text << " is " << health_[violated_].value << ", must be " << rule.comparison.text();
     return text.str();
   }
-  const std::string failure = link_.last_failure();
+  const std::string failure = link_.recent_failure();
   if (last_fault_ == Fault::timeout && failure.empty())
     return "the device does not keep up with the loop";
   return failure;

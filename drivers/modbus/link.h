@@ -24,6 +24,10 @@
 
 namespace sinerig::modbus {
 
+// Part of a period that an exchange may wait for its answers.
+inline constexpr double usual_timeout = 0.75;
+inline constexpr double longest_timeout = 0.9;
+
 struct LinkSettings {
   ConnectionSettings connection;
   Writing writing = Writing::automatic;
@@ -69,6 +73,9 @@ class Link {
   // where the device does not know it and the rig file leaves the choice.
   Pace try_out(std::optional<double> command, std::size_t exchanges);
   std::string last_failure() const;
+  // The same where it is of the last second before the newest tick; empty: what has happened since
+  // has another cause. Not while the loop runs.
+  std::string recent_failure() const;
   std::string describe(const Answer& answer) const;
   Pace pace() const;  // of the loop so far
   TransportCounters counters() const;
@@ -120,6 +127,7 @@ class Link {
   void find_spare_registers();
   void reconnect_now_and_then() noexcept;
   bool connect_and_hear() noexcept;
+  void note_failure(const Answer& answer) noexcept;
 
   // Between two attempts: a device that restarts is often back after a few ticks.
   static constexpr std::int64_t first_pause_ns = 10'000'000;
@@ -153,6 +161,7 @@ class Link {
   PaceRecord pace_;
   Answer failure_;
   bool has_failed_ = false;
+  std::int64_t failure_ns_ = 0;
   std::int64_t next_reconnect_ns_ = 0;
   std::int64_t pause_ns_ = first_pause_ns;
 

@@ -1,6 +1,9 @@
 #include "drivers/modbus/sequence.h"
 
+#include <array>
 #include <chrono>
+#include <cmath>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <thread>
@@ -52,7 +55,7 @@ std::string perform(Transport& transport, const Step& step, const Waiting& waiti
     for (;;) {
       const Reading reading = read_number(transport, step.place, monotonic_now_ns() + answer_ns);
       const bool believed = reading.answer.outcome == Outcome::ok;
-      if (believed && step.expect->holds(reading.value)) break;
+      if (believed && step.expect->holds(reading.value, step.place.format)) break;
       const bool hopeless = reading.answer.outcome == Outcome::exception || !transport.connected();
       if (hopeless || monotonic_now_ns() >= until_ns) {
         if (!believed) return transport.describe(reading.answer);
@@ -72,12 +75,22 @@ std::string perform(Transport& transport, const Step& step, const Waiting& waiti
 
 }  // namespace
 
-bool Comparison::holds(double measured) const noexcept {
+bool Comparison::holds(double measured, const Format& format) const noexcept {
+  if (std::isnan(measured)) return false;
+  // What the rig file says in decimals is not to the last bit what scale and offset make of a code.
+  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
+                          (std::abs(value) + std::abs(format.offset) + std::abs(format.scale));
+  const bool is_float =
+      format.type == RegisterType::float32 || format.type == RegisterType::float64;
+  std::array<std::uint16_t, max_words> registers{};
+  const double as_float = is_float ? std::abs(encode(registers, format, value) - value) : 0.0;
+  const double slack = rounding + as_float;
+  const double same = is_float ? slack : 0.5 * std::abs(format.scale);
   switch (sign) {
-    case Operator::equal: return measured == value;
-    case Operator::not_equal: return measured != value;
-    case Operator::at_most: return measured <= value;
-    case Operator::at_least: return measured >= value;
+    case Operator::equal: return std::abs(measured - value) <= same;
+    case Operator::not_equal: return !(std::abs(measured - value) <= same);
+    case Operator::at_most: return measured <= value + slack;
+    case Operator::at_least: return measured >= value - slack;
   }
   return false;
 }

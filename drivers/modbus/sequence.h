@@ -17,7 +17,8 @@ struct Comparison {
   Operator sign = Operator::equal;
   double value = 0.0;
 
-  bool holds(double measured) const noexcept;
+  // Of a number read in this format: equal is what is the same code. NaN holds for nothing.
+  bool holds(double measured, const Format& format) const noexcept;
   std::string text() const;  // "= 1"
 };
 

@@ -5,7 +5,6 @@
 #include <cstring>
 #include <poll.h>
 #include <stdexcept>
-#include <termios.h>
 #include <unistd.h>
 #include <utility>
 
@@ -45,6 +44,14 @@ bool wait_for_input(int fd, std::int64_t until_ns) noexcept {
   return ppoll(&input, 1, &left, nullptr) > 0;
 }
 
+// As it goes out on a serial line.
+RequestBytes with_check_sum(RequestBytes request) noexcept {
+  const std::uint16_t crc = crc16(request.bytes());
+  request.data[request.size++] = static_cast<std::uint8_t>(crc & 0xFFU);
+  request.data[request.size++] = static_cast<std::uint8_t>(crc >> 8U);
+  return request;
+}
+
 }  // namespace
 
 std::int64_t Transport::wire_ns(std::size_t bytes) const noexcept {
@@ -60,17 +67,33 @@ int Transport::pending() const noexcept {
 
 void Transport::clear_input() noexcept {
   if (settings_.serial) {
-    tcflush(socket(), TCIFLUSH);
+    take_in_late_answers();
   } else {
     modbus_flush(context_.get());
   }
 }
 
 void Transport::take_in_late_answers() noexcept {
-  if (!settings_.serial || pending() == 0) return;
-  clear_input();
-  ++counters_.late_answers;
-  late_.one_came(monotonic_now_ns());
+  if (!settings_.serial) return;
+  std::array<std::uint8_t, 256> bytes{};
+  while (pending() > 0) {
+    const ssize_t count = read(socket(), bytes.data(), bytes.size());
+    if (count <= 0) break;
+    keep_stray(std::span{bytes}.first(static_cast<std::size_t>(count)));
+  }
+  while (const std::size_t end = late_.take_from(std::span{stray_}.first(stray_size_))) {
+    ++counters_.late_answers;
+    std::copy(stray_.begin() + static_cast<std::ptrdiff_t>(end),
+              stray_.begin() + static_cast<std::ptrdiff_t>(stray_size_), stray_.begin());
+    stray_size_ -= end;
+  }
+}
+
+// The newest of them, where there are more than any answer has.
+void Transport::keep_stray(std::span<const std::uint8_t> bytes) noexcept {
+  if (stray_size_ + bytes.size() > stray_.size()) stray_size_ = 0;
+  std::ranges::copy(bytes, stray_.begin() + static_cast<std::ptrdiff_t>(stray_size_));
+  stray_size_ += bytes.size();
 }
 
 bool Transport::send(const RequestBytes& request) noexcept {
@@ -116,10 +139,8 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
     disconnect();
     return answer;
   }
-  if (echoes_ && !discard_echo(bytes.size + crc_bytes, deadline_ns))
-    answer.outcome = Outcome::timeout;
-  else
-    receive(request, deadline_ns, registers, answer);
+  answer.outcome = echoes_ ? discard_echo(bytes, deadline_ns) : Outcome::ok;
+  if (answer.outcome == Outcome::ok) receive(request, deadline_ns, registers, answer);
   answer.received_ns = monotonic_now_ns();
 
   const std::int64_t earliest_ns = answer.sent_ns + wire_ns(bytes.size + crc_bytes);
@@ -193,26 +214,29 @@ void Transport::receive(const Request& request, std::int64_t deadline_ns,
   }
 }
 
-bool Transport::discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept {
-  std::array<std::uint8_t, 64> echo{};
-  while (bytes > 0) {
-    if (!wait_for_input(socket(), deadline_ns)) return false;
-    const ssize_t count = read(socket(), echo.data(), std::min(bytes, echo.size()));
-    if (count <= 0) return false;
-    bytes -= static_cast<std::size_t>(count);
+// What comes in the place of an echo is a late answer, or noise before it.
+Outcome Transport::discard_echo(const RequestBytes& request, std::int64_t deadline_ns) noexcept {
+  const RequestBytes sent = with_check_sum(request);
+  std::array<std::uint8_t, sizeof(sent.data)> echo{};
+  std::size_t size = 0;
+  while (size < sent.size) {
+    if (!wait_for_input(socket(), deadline_ns)) return Outcome::timeout;
+    const ssize_t count = read(socket(), echo.data() + size, sent.size - size);
+    if (count <= 0) return Outcome::timeout;
+    size += static_cast<std::size_t>(count);
   }
-  return true;
+  const auto came = std::span<const std::uint8_t>{echo}.first(size);
+  if (std::ranges::equal(came, sent.bytes())) return Outcome::ok;
+  keep_stray(came);
+  return Outcome::spoiled;
 }
 
 void Transport::look_for_echo(const Request& request) noexcept {
   echoes_ = false;
   if (!settings_.serial || !connected_) return;
   clear_input();
-  RequestBytes sent = bytes_of(request);
-  if (!send(sent)) return;
-  const std::uint16_t crc = crc16(sent.bytes());
-  sent.data[sent.size++] = static_cast<std::uint8_t>(crc & 0xFFU);
-  sent.data[sent.size++] = static_cast<std::uint8_t>(crc >> 8U);
+  if (!send(bytes_of(request))) return;
+  const RequestBytes sent = with_check_sum(bytes_of(request));
 
   const std::int64_t until_ns = monotonic_now_ns() + echo_wait_ns;
   std::size_t same = 0;
@@ -229,6 +253,7 @@ void Transport::look_for_echo(const Request& request) noexcept {
     if (read(socket(), rest.data(), rest.size()) <= 0) break;
   }
   late_.clear();
+  stray_size_ = 0;
 }
 
 std::string Transport::describe(const Answer& answer) const {

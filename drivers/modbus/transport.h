@@ -8,6 +8,7 @@
 // Not thread-safe. Nothing in it is for the loop.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -110,13 +111,15 @@ class Transport {
     void operator()(_modbus* context) const noexcept;
   };
 
+  bool runs_at_its_rate() const noexcept;
   bool switch_transmitter() noexcept;
   bool send(const RequestBytes& request) noexcept;
   void note_answer(std::uint16_t number) noexcept;
   void receive(const Request& request, std::int64_t deadline_ns, std::span<std::uint16_t> registers,
                Answer& answer) noexcept;
-  bool discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept;
+  Outcome discard_echo(const RequestBytes& request, std::int64_t deadline_ns) noexcept;
   void take_in_late_answers() noexcept;
+  void keep_stray(std::span<const std::uint8_t> bytes) noexcept;
   void clear_input() noexcept;
   int pending() const noexcept;
   int socket() const noexcept;
@@ -132,6 +135,9 @@ class Transport {
   bool connected_ = false;
   bool echoes_ = false;
   LateAnswers late_;  // serial lines
+  // Serial lines: what came between two questions, in which a late answer may not be whole yet.
+  std::array<std::uint8_t, 512> stray_{};
+  std::size_t stray_size_ = 0;
 };
 
 }  // namespace sinerig::modbus

@@ -1,4 +1,5 @@
 // How a connection is made and ended; transport.cpp asks and waits on it.
+#include <algorithm>
 #include <cerrno>
 #include <netdb.h>
 #include <stdexcept>
@@ -10,6 +11,7 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
+#include "drivers/modbus/line_rates.h"
 #include "drivers/modbus/transport.h"
 
 namespace sinerig::modbus {
@@ -100,7 +102,7 @@ bool Transport::try_connect() noexcept {
     errno = error;
     return false;
   }
-  if (settings_.serial && !switch_transmitter()) {
+  if (settings_.serial && (!runs_at_its_rate() || !switch_transmitter())) {
     const int error = errno;
     context_.reset();
     errno = error;
@@ -111,8 +113,19 @@ bool Transport::try_connect() noexcept {
   answered_ = transaction_;
   writes_waiting_ = 0;
   late_.clear();
+  stray_size_ = 0;
   ++counters_.connections;
   return true;
+}
+
+// False, and errno, where the port has another rate than it was told: nothing would be understood.
+bool Transport::runs_at_its_rate() const noexcept {
+  const auto* const rate = std::ranges::find(line_rates, settings_.baud, &LineRate::baud);
+  termios port{};
+  if (tcgetattr(socket(), &port) != 0) return false;
+  errno = ERANGE;
+  return rate != line_rates.end() && cfgetospeed(&port) == rate->speed &&
+         cfgetispeed(&port) == rate->speed;
 }
 
 // False, and errno, where the port cannot switch it as the rig file says.
@@ -145,6 +158,9 @@ void Transport::connect() {
   if (!settings_.serial)
     throw std::runtime_error(where + "no connection (" + why +
                              "): is the device on, are host and port right?");
+  if (error == ERANGE)
+    throw std::runtime_error(where + "this serial port does not run at " +
+                             std::to_string(settings_.baud) + " baud");
   const bool refused = error == ENOTTY || error == EINVAL;
   if (settings_.rs485 == Rs485::kernel && refused)
     throw std::runtime_error(where + "this serial port has no RS-485 mode (" + why +

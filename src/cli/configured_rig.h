@@ -32,7 +32,7 @@ class ConfiguredRig final : public Rearm {
   // Where it throws, nothing is armed any more.
   void arm();
   void catch_up();  // with what has come since: right before the loop
-  std::string fault_reason() const override;
+  std::string fault_reason(const Trip& trip) const override;
   std::string arm_again() override;
   void keep_released() noexcept override;
   std::string not_released() const override;

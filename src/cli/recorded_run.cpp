@@ -170,7 +170,8 @@ std::string reason_of(const Played& played, const Outbox& outbox, const Configur
   std::string reason = describe(trip, configured.rig().sensor_names());
   const bool by_device =
       trip.cause == TripCause::actuator_fault || trip.cause == TripCause::channel_age;
-  if (by_device && !configured.fault_reason().empty()) reason += ": " + configured.fault_reason();
+  if (const std::string said = configured.fault_reason(trip); by_device && !said.empty())
+    reason += ": " + said;
   if (played.outcome.faults > 0 && trip.device_fault()) {
     reason +=
         " (" + std::to_string(played.outcome.faults) + " tries to arm again are spent, [retry])";

@@ -18,8 +18,9 @@ Recovery::Recovery(const RetrySettings& settings, Clock& clock, RecordSink& sink
       faults_{settings.faults, settings.faults_in_all},
       soft_{settings.soft, settings.soft_in_all} {}
 
-Recovery::End Recovery::after_fault(std::uint32_t dwell, RunControl& control) noexcept {
-  const std::string reason = rearm_->fault_reason();
+Recovery::End Recovery::after_fault(const Trip& trip, std::uint32_t dwell,
+                                    RunControl& control) noexcept {
+  const std::string reason = rearm_->fault_reason(trip);
   if (!reason.empty()) note(EventKind::device_fault, dwell, clock_.now().tick, reason);
   while (faults_.spend()) {
     sink_.put(Event{.kind = EventKind::rearming,

@@ -25,7 +25,7 @@ class Recovery {
   // With the actuator released, outside the loop: each wait goes by the clock, a stop request cuts
   // it short, that of arming, too:
   // then the device may be armed. Notes what it does.
-  End after_fault(std::uint32_t dwell, RunControl& control) noexcept;
+  End after_fault(const Trip& trip, std::uint32_t dwell, RunControl& control) noexcept;
 
   // After a release: whether it was one, as far as anybody can tell.
   void tell_release(std::uint32_t dwell, std::uint64_t tick) noexcept;

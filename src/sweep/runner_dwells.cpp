@@ -15,7 +15,7 @@ bool SweepRunner::recover(RunControl& control) noexcept {
   if ((!under_way() && !probing) || !recovery_.worth_it(guard_.trip())) return false;
   tell_trip(EventKind::tripped);
   recovery_.tell_release(dwell_, last_tick_);
-  const Recovery::End end = recovery_.after_fault(dwell_, control);
+  const Recovery::End end = recovery_.after_fault(guard_.trip(), dwell_, control);
   last_tick_ = clock_.now().tick;
   if (end == Recovery::End::used_up) return false;
   guard_.resume();

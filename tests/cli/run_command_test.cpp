@@ -13,6 +13,7 @@
 #include <sys/resource.h>
 
 #include "cli/commands.h"
+#include "cli/configured_rig.h"
 #include "record/sweep_reader.h"
 #include "support/fake_rig.h"
 
@@ -32,6 +33,7 @@ struct Witness {
   std::function<void(const Waiting&)> arming_again{};
   std::optional<std::uint64_t> faulty_tick{};
   std::string not_released{};
+  std::string says{};  // of its faults
 };
 
 // Moves its output on opening, and lets go of it at its end.
@@ -68,6 +70,7 @@ class FakeDevice final : public Device {
     witness_.parts_when_caught_up = parts.integer(0);
   }
   std::string not_released() const override { return witness_.not_released; }
+  std::string fault_reason() const override { return witness_.says; }
   Actuator* actuator() noexcept override { return &*actuator_; }
   Sensor& sensor(std::size_t) noexcept override { return *sensor_; }
 
@@ -87,6 +90,7 @@ class FakeDevice final : public Device {
 class BrokenDevice final : public Device {
  public:
   void open(const Clock&) override { throw std::runtime_error("the bus is not there"); }
+  std::string fault_reason() const override { return "edges were lost"; }
   Actuator* actuator() noexcept override { return nullptr; }
   Sensor& sensor(std::size_t) noexcept override { std::abort(); }
 };
@@ -132,6 +136,18 @@ TEST_F(RunCommand, ReleasesTheActuatorWhenAnotherDriverCannotBeOpened) {
   EXPECT_EQ(witness.last, 0.0);
   EXPECT_GE(witness.releases, 1);
   EXPECT_FALSE(fs::exists(folder_ / "run.sweep"));
+}
+
+TEST_F(RunCommand, AsksTheDeviceOfTheChannelThatHasTrippedWhy) {
+  Witness witness;
+  witness.says = "no answer in time";
+  const DriverKit broken{.name = "broken", .summary = "", .configure = [](const DeviceRequest&) {
+                           return std::make_unique<BrokenDevice>();
+                         }};
+  const ConfiguredRig two{rig("[sensor.z]\ndriver = \"broken\"\n"), {fake(witness), broken}};
+  EXPECT_EQ(two.fault_reason({.cause = TripCause::actuator_fault}), "no answer in time");
+  EXPECT_EQ(two.fault_reason({.cause = TripCause::channel_age, .channel = 0}), "no answer in time");
+  EXPECT_EQ(two.fault_reason({.cause = TripCause::channel_age, .channel = 1}), "edges were lost");
 }
 
 // That commit may take a disk a while.

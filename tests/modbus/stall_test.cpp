@@ -206,6 +206,8 @@ TEST_P(ModbusStall, LeavesFewSetPointsAndNoOrderToSwitchOnForADriveThatGoesOn) {
   actuator->arm();
   drive_on(link, *actuator, 5);
   EXPECT_EQ(link.newest().fate, CommandFate::confirmed);
+  EXPECT_NE(link.last_failure(), "");
+  EXPECT_EQ(actuator->reason(), "") << "what has failed before is not what is wrong now";
 }
 
 INSTANTIATE_TEST_SUITE_P(Of, ModbusStall, testing::Values(false, true), [](const auto& of) {

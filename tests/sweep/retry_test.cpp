@@ -37,7 +37,7 @@ class TrippingDrive final : public Rearm {
       return tripped ? Fault::device : Fault::none;
     };
   }
-  std::string fault_reason() const override { return "axis_error is 64, must be = 0"; }
+  std::string fault_reason(const Trip&) const override { return "axis_error is 64, must be = 0"; }
   std::string arm_again() override {
     EXPECT_TRUE(bench_.actuator.released);
     armed_at.push_back(bench_.clock.tick());
