@@ -52,6 +52,9 @@ std::string obstacle(const Link& link, const Pace& pace) {
   text << ": set [loop] rate_hz to " << std::floor(usual_timeout * 1e9 / slow_ns) << " at most";
   if (fits_the_period)
     text << ", or response_timeout_s to " << std::ceil(slow_ns * 1e-4) * 1e-5 << " at least";
+  if (settings.connection.silence_ns > 0)
+    text << "; " << milliseconds(settings.connection.silence_ns)
+         << " before each question are the line's silence, silence_s";
   return text.str();
 }
 

@@ -138,6 +138,10 @@ void read_address(const Section& section, ConnectionSettings& settings) {
   const std::string parity = section.choice("parity", {"even", "none", "odd"});
   settings.parity = parity == "none" ? 'N' : parity == "odd" ? 'O' : 'E';
   settings.stop_bits = static_cast<int>(section.integer("stop_bits", {.min = 1.0, .max = 2.0}, 1));
+  // 3.5 characters of 11 bits; above 19200 baud the standard recommends one time for all.
+  const double silence_s = std::max(1.75e-3, 3.5 * 11.0 / settings.baud);
+  settings.silence_ns =
+      nanoseconds(section.number("silence_s", {.min = 0.0, .max = 0.1}, silence_s));
   const std::string rs485 = section.choice("rs485", {"adapter", "kernel", "rts_up", "rts_down"});
   settings.rs485 = rs485 == "kernel"     ? Rs485::kernel
                    : rs485 == "rts_up"   ? Rs485::rts_up

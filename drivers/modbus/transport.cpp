@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <poll.h>
 #include <stdexcept>
 #include <unistd.h>
@@ -79,6 +80,7 @@ void Transport::take_in_late_answers() noexcept {
   while (pending() > 0) {
     const ssize_t count = read(socket(), bytes.data(), bytes.size());
     if (count <= 0) break;
+    busy_until_ns_ = monotonic_now_ns();
     keep_stray(std::span{bytes}.first(static_cast<std::size_t>(count)));
   }
   while (const std::size_t end = late_.take_from(std::span{stray_}.first(stray_size_))) {
@@ -94,6 +96,15 @@ void Transport::keep_stray(std::span<const std::uint8_t> bytes) noexcept {
   if (stray_size_ + bytes.size() > stray_.size()) stray_size_ = 0;
   std::ranges::copy(bytes, stray_.begin() + static_cast<std::ptrdiff_t>(stray_size_));
   stray_size_ += bytes.size();
+}
+
+// Without it those on the line take two frames for one, and drop both.
+void Transport::keep_silence(std::int64_t deadline_ns) const noexcept {
+  if (!settings_.serial) return;
+  const std::int64_t until_ns = std::min(busy_until_ns_ + settings_.silence_ns, deadline_ns);
+  const timespec until{.tv_sec = until_ns / ns_per_s, .tv_nsec = until_ns % ns_per_s};
+  while (monotonic_now_ns() < until_ns)
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
 }
 
 bool Transport::send(const RequestBytes& request) noexcept {
@@ -121,6 +132,8 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
   }
   Request request = wanted;
   take_in_late_answers();
+  keep_silence(deadline_ns);
+  take_in_late_answers();
   if (settings_.serial && late_.could_be(request, monotonic_now_ns())) {
     answer.outcome = Outcome::timeout;
     answer.withheld = true;
@@ -142,6 +155,7 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
   answer.outcome = echoes_ ? discard_echo(bytes, deadline_ns) : Outcome::ok;
   if (answer.outcome == Outcome::ok) receive(request, deadline_ns, registers, answer);
   answer.received_ns = monotonic_now_ns();
+  busy_until_ns_ = answer.received_ns;
 
   const std::int64_t earliest_ns = answer.sent_ns + wire_ns(bytes.size + crc_bytes);
   const std::int64_t latest_ns = answer.received_ns - wire_ns(1 + reply_size(request) + crc_bytes);

@@ -35,6 +35,7 @@ struct ConnectionSettings {
   char parity = 'E';  // 'N', 'E' or 'O'
   int stop_bits = 1;
   Rs485 rs485 = Rs485::adapter;
+  std::int64_t silence_ns = 0;  // before a request: it ends a frame on a serial line
 
   std::string address() const { return serial ? device : host + ":" + std::to_string(port); }
 };
@@ -119,6 +120,7 @@ class Transport {
                Answer& answer) noexcept;
   Outcome discard_echo(const RequestBytes& request, std::int64_t deadline_ns) noexcept;
   void take_in_late_answers() noexcept;
+  void keep_silence(std::int64_t deadline_ns) const noexcept;
   void keep_stray(std::span<const std::uint8_t> bytes) noexcept;
   void clear_input() noexcept;
   int pending() const noexcept;
@@ -138,6 +140,7 @@ class Transport {
   // Serial lines: what came between two questions, in which a late answer may not be whole yet.
   std::array<std::uint8_t, 512> stray_{};
   std::size_t stray_size_ = 0;
+  std::int64_t busy_until_ns_ = 0;  // the line, as far as it is known
 };
 
 }  // namespace sinerig::modbus

@@ -32,7 +32,8 @@ struct DriveSettings {
   std::string link;   // serial: a symbolic link to the pseudo-terminal
   int baud = 115200;  // serial: what frames take on the wire
   int bits_per_byte = 11;
-  bool echo = false;  // serial: an adapter that returns what is sent
+  bool echo = false;            // serial: an adapter that returns what is sent
+  std::int64_t silence_ns = 0;  // serial: a request sooner after a reply is not heard
   std::uint8_t unit = 1;
   std::string type = "float32";
   bool low_word_first = false;

@@ -484,6 +484,24 @@ TEST_P(ModbusLink, RefusesADriveThatMostlyRefuses) {
               ThrowsMessage<std::runtime_error>(HasSubstr("exception 4, device failure")));
 }
 
+// Two questions for each tick, and a drive that takes one too soon for the end of its own reply.
+TEST(ModbusSilence, IsKeptBeforeEveryQuestion) {
+  sim::DriveSettings settings = drive_settings(true);
+  settings.silence_ns = 3'000'000;
+  settings.has_function_23 = false;
+  Rig rig{settings};
+  LinkSettings patient = rig.link_settings();
+  patient.connection.silence_ns = settings.silence_ns;
+  Link link{patient};
+  ModbusActuator actuator{link, Rig::command()};
+  ModbusSensor position{link, FeedbackSettings{number_at(34)}, "[sensor.position]", true};
+  link.open();
+  actuator.start();
+  actuator.arm();
+  EXPECT_EQ(link.counters().timeouts, 0U);
+  EXPECT_EQ(link.counters().late_answers, 0U);
+}
+
 // What is withheld while a late answer may come is no loss: on a serial line it is five times as
 // much.
 TEST_P(ModbusLink, TakesADriveThatLosesOneAnswerInFiftyAndNoneThatLosesOneInFour) {

@@ -113,6 +113,17 @@ TEST(ModbusConfig, RefusesLimitsBeyondWhatGoesOut) {
               HasSubstr("[actuator] clamp_max = 0.1: the command goes out as -inf to 0.1: set"));
 }
 
+TEST(ModbusConfig, KeepsTheSilenceOfTheStandard) {
+  const auto silence_ns = [](const std::string& keys) {
+    const auto file = RigFile::parse(
+        "[modbus.drive]\ntransport = \"rtu\"\ndevice = \"/dev/x\"\n" + keys, "rig.toml");
+    return read_connection(file->children("modbus").front(), 10.0).link.connection.silence_ns;
+  };
+  EXPECT_EQ(silence_ns("baud = 9600\n"), 4'010'417);
+  EXPECT_EQ(silence_ns("baud = 115200\n"), 1'750'000);
+  EXPECT_EQ(silence_ns("silence_s = 0\n"), 0);
+}
+
 TEST(ModbusConfig, LeavesTimeInThePeriod) {
   const auto file = RigFile::parse("[modbus.drive]\nhost = \"h\"\n", "rig.toml");
   const Connection connection = read_connection(file->children("modbus").front(), 500.0);
