@@ -39,22 +39,25 @@ std::string obstacle(const Link& link, const Pace& pace) {
   const auto period_ns = static_cast<double>(settings.period_ns);
   const auto timeout_ns = static_cast<double>(settings.response_timeout_ns);
   const auto slow_ns = static_cast<double>(pace.slow_ns);
-  const bool fits_the_period = slow_ns <= longest_timeout * period_ns;
+  const auto silence_ns = static_cast<double>(settings.connection.silence_ns);
+  const bool fits_the_period = slow_ns + silence_ns <= longest_timeout * period_ns;
   if (fits_the_period && slow_ns <= timeout_ns) return "";
   text.precision(4);
   text << where << settings.connection.address() << ": an exchange takes "
-       << milliseconds(pace.median_ns) << ", one in twenty more than " << milliseconds(pace.slow_ns)
-       << "; the loop at " << 1e9 / period_ns << " Hz needs one every "
+       << milliseconds(pace.median_ns) << ", one in twenty more than "
+       << milliseconds(pace.slow_ns);
+  if (silence_ns > 0.0)
+    text << ", and " << milliseconds(settings.connection.silence_ns) << " of silence";
+  text << "; the loop at " << 1e9 / period_ns << " Hz needs one every "
        << milliseconds(settings.period_ns);
   if (fits_the_period)
     text << " and gives it up after " << milliseconds(settings.response_timeout_ns);
   // At the rate that is advised the usual time-out covers it.
-  text << ": set [loop] rate_hz to " << std::floor(usual_timeout * 1e9 / slow_ns) << " at most";
+  const double advised_ns =
+      std::max(slow_ns / usual_timeout, (slow_ns + silence_ns) / longest_timeout);
+  text << ": set [loop] rate_hz to " << std::floor(1e9 / advised_ns) << " at most";
   if (fits_the_period)
     text << ", or response_timeout_s to " << std::ceil(slow_ns * 1e-4) * 1e-5 << " at least";
-  if (settings.connection.silence_ns > 0)
-    text << "; " << milliseconds(settings.connection.silence_ns)
-         << " before each question are the line's silence, silence_s";
   return text.str();
 }
 

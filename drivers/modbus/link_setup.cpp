@@ -132,6 +132,8 @@ Pace Link::try_out(std::optional<double> command, std::size_t exchanges) {
   while (asked < exchanges && failed < most_failures && transport_.connected()) {
     waiting_.go_on();
     Exchange exchange;
+    // In the loop it has passed by the next tick.
+    transport_.keep_silence(monotonic_now_ns() + trial_ns);
     const Order order{.number = 0,
                       .handed_over_ns = monotonic_now_ns(),
                       .commands = command.has_value(),

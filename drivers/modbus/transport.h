@@ -93,6 +93,10 @@ class Transport {
   Answer ask(const Request& request, std::int64_t deadline_ns,
              std::span<std::uint16_t> registers) noexcept;
 
+  // Serial lines: waits, until `deadline_ns` at most, for the silence that a question needs; ask()
+  // does it by itself.
+  void keep_silence(std::int64_t deadline_ns) const noexcept;
+
   // How long an answer may take as a rule: one to a question with less time left is late no sooner.
   void set_usual_patience(std::int64_t patience_ns) noexcept { usual_patience_ns_ = patience_ns; }
 
@@ -120,7 +124,6 @@ class Transport {
                Answer& answer) noexcept;
   Outcome discard_echo(const RequestBytes& request, std::int64_t deadline_ns) noexcept;
   void take_in_late_answers() noexcept;
-  void keep_silence(std::int64_t deadline_ns) const noexcept;
   void keep_stray(std::span<const std::uint8_t> bytes) noexcept;
   void clear_input() noexcept;
   int pending() const noexcept;

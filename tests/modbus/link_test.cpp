@@ -627,6 +627,10 @@ TEST(ModbusPace, RefusesADeviceThatIsSlowerThanItsTimeOut) {
   at_rate(200.0);
   settings.response_timeout_ns = 4'120'000;
   EXPECT_EQ(obstacle(Link{settings}, slow), "");
+  settings.connection.silence_ns = 1'750'000;
+  EXPECT_THAT(obstacle(Link{settings}, slow),
+              HasSubstr("more than 4.11 ms, and 1.75 ms of silence; the loop at 200 Hz needs one "
+                        "every 5 ms: set [loop] rate_hz to 153 at most"));
 }
 
 TEST(ModbusOpening, SaysWhichChannelAsksForARegisterThatIsNotThere) {
