@@ -50,6 +50,10 @@ class Device {
   // Outside the loop, after Actuator::release(): tries what that could not carry out.
   virtual void keep_released() noexcept {}
 
+  // Of the last Actuator::release() or keep_released(): what the device has not taken, for people;
+  // empty where it is released as far as can be told.
+  virtual std::string not_released() const { return {}; }
+
   // Why a command had a fault or a sensor is no longer believed, for people; empty where there is
   // nothing to say.
   virtual std::string fault_reason() const { return {}; }

@@ -132,11 +132,19 @@ void CanActuator::release() noexcept {
   bus_.poll();  // what happened to the bus since the last tick
   bus_.reserve(Bus::Room::lists);
   Patience patience;
-  const bool neutral = send_neutral(patience);
+  neutral_out_ = send_neutral(patience);
   const bool disarmed = run_all(bus_, settings_.disarm, patience) == 0;
   bus_.poll();
   // A bus that died meanwhile has thrown away what waited in its queue.
-  released_ = neutral && disarmed && bus_.state() == BusState::up;
+  neutral_out_ = neutral_out_ && bus_.state() == BusState::up;
+  released_ = neutral_out_ && disarmed;
+}
+
+std::string CanActuator::not_released() const {
+  if (released_) return "";
+  const std::string what = neutral_out_ ? "the drive has not taken all of its disarm list"
+                                        : "neutral has not gone out to the drive";
+  return what + ", which may still be on: " + bus_.interface();
 }
 
 std::string CanActuator::reason() const {

@@ -69,6 +69,7 @@ class CanActuator final : public Actuator {
   // out is tried again by the next release(), by start() and by the destructor.
   void release() noexcept override;
   bool released() const noexcept { return released_; }
+  std::string not_released() const;  // what has not gone out; empty when all has
 
   // Why the last write() had a fault, for people; empty when it had none. Not for the loop.
   std::string reason() const;
@@ -95,6 +96,7 @@ class CanActuator final : public Actuator {
   bool started_ = false;
   bool ages_begin_ = false;  // at the next write()
   bool released_ = true;
+  bool neutral_out_ = true;  // with the last release
 };
 
 }  // namespace sinerig::can

@@ -88,6 +88,8 @@ class CanDevice final : public Device {
     if (actuator_) actuator_->release();
   }
 
+  std::string not_released() const override { return actuator_ ? actuator_->not_released() : ""; }
+
   void catch_up() override {
     for (const auto& bus : buses_) bus->drain();
     for (const auto& sensor : sensors_) sensor->catch_up();

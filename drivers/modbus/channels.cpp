@@ -14,7 +14,6 @@ namespace {
 
 constexpr std::size_t no_rule = static_cast<std::size_t>(-1);
 constexpr std::size_t trial_exchanges = 100;
-constexpr double largest_part_of_period = 0.9;
 // Of the 100 that were asked; those withheld while a late answer may come don't count. A line that
 // loses 1 % is refused once in 1e8 trials, one that loses 5 % once in 85.
 constexpr double largest_failed_part = 0.10;
@@ -37,15 +36,28 @@ std::string obstacle(const Link& link, const Pace& pace) {
          << " exchanges failed: " << link.last_failure();
     return text.str();
   }
-  const double allowed_ns = largest_part_of_period * static_cast<double>(settings.period_ns);
-  if (static_cast<double>(pace.slow_ns) <= allowed_ns) return "";
-  const double most_hz = largest_part_of_period * 1e9 / static_cast<double>(pace.slow_ns);
-  const double rate_hz = 1e9 / static_cast<double>(settings.period_ns);
+  const auto period_ns = static_cast<double>(settings.period_ns);
+  const auto timeout_ns = static_cast<double>(settings.response_timeout_ns);
+  const auto slow_ns = static_cast<double>(pace.slow_ns);
+  const auto silence_ns = static_cast<double>(settings.connection.silence_ns);
+  const bool fits_the_period = slow_ns + silence_ns <= longest_timeout * period_ns;
+  if (fits_the_period && slow_ns <= timeout_ns) return "";
   text.precision(4);
   text << where << settings.connection.address() << ": an exchange takes "
-       << milliseconds(pace.median_ns) << ", one in twenty more than " << milliseconds(pace.slow_ns)
-       << "; the loop at " << rate_hz << " Hz needs one every " << milliseconds(settings.period_ns)
-       << ": set [loop] rate_hz to " << std::floor(most_hz) << " at most";
+       << milliseconds(pace.median_ns) << ", one in twenty more than "
+       << milliseconds(pace.slow_ns);
+  if (silence_ns > 0.0)
+    text << ", and " << milliseconds(settings.connection.silence_ns) << " of silence";
+  text << "; the loop at " << 1e9 / period_ns << " Hz needs one every "
+       << milliseconds(settings.period_ns);
+  if (fits_the_period)
+    text << " and gives it up after " << milliseconds(settings.response_timeout_ns);
+  // At the rate that is advised the usual time-out covers it.
+  const double advised_ns =
+      std::max(slow_ns / usual_timeout, (slow_ns + silence_ns) / longest_timeout);
+  text << ": set [loop] rate_hz to " << std::floor(1e9 / advised_ns) << " at most";
+  if (fits_the_period)
+    text << ", or response_timeout_s to " << std::ceil(slow_ns * 1e-4) * 1e-5 << " at least";
   return text.str();
 }
 
@@ -56,7 +68,7 @@ void require_pace(const Link& link, const Pace& pace) {
 
 ModbusActuator::ModbusActuator(Link& link, CommandSettings settings)
     : link_{link}, settings_{std::move(settings)}, violated_{no_rule} {
-  link_.command(settings_.place);
+  link_.command(settings_.place, settings_.neutral);
   for (const HealthRule& rule : settings_.health)
     health_fields_.push_back(link_.watch(rule.place, "[actuator] health, " + rule.name));
   health_.resize(settings_.health.size());
@@ -81,13 +93,16 @@ void ModbusActuator::start() {
 }
 
 // Neutral goes out before the drive is armed: one that finds a stale set-point would jump. A drive
-// may refuse it until it is armed, and then has none.
+// may refuse it until it is armed, and then has none. One that says nothing is not armed: what
+// switches it on would wait for it, and be carried out when nobody looks any more.
 void ModbusActuator::arm() {
   released_ = false;
   try {
     link_.idle([&](Transport& transport) {
-      write_number(transport, settings_.place, settings_.neutral, link_.settings().writing,
-                   monotonic_now_ns() + 500'000'000);
+      const Answer answer =
+          write_surely(transport, settings_.place, settings_.neutral, link_.settings().writing);
+      if (answer.outcome != Outcome::ok && answer.outcome != Outcome::exception)
+        throw std::runtime_error("neutral, before it is armed: " + transport.describe(answer));
       run(transport, settings_.arm, "arm", link_.waiting());
     });
     require_pace(link_, link_.try_out(settings_.neutral, trial_exchanges));
@@ -154,7 +169,8 @@ void ModbusActuator::look_after_health() noexcept {
     const bool unknown =
         settings_.max_age_ns > 0 && link_.tick_ns() - health_[n].time_ns > settings_.max_age_ns;
     const bool bad =
-        health_[n].fault == Fault::none && !settings_.health[n].comparison.holds(health_[n].value);
+        health_[n].fault == Fault::none &&
+        !settings_.health[n].comparison.holds(health_[n].value, settings_.health[n].place.format);
     if (violated_ == no_rule && (bad || unknown)) {
       violated_ = n;
       health_is_old_ = !bad;
@@ -164,12 +180,21 @@ void ModbusActuator::look_after_health() noexcept {
 
 void ModbusActuator::release() noexcept {
   if (released_) return;
-  const Link::Released done = link_.release(settings_.neutral, settings_.disarm);
-  if (done.neutral) held_.value = settings_.neutral;
-  released_ = done.neutral && done.disarmed;
+  release_ = link_.release(settings_.neutral, settings_.disarm);
+  if (release_.neutral) held_.value = settings_.neutral;
+  released_ = release_.neutral && release_.disarmed;
+}
+
+std::string ModbusActuator::not_released() const {
+  if (released_) return "";
+  if (release_.neutral)
+    return "the drive has not taken all of its disarm list and may still be on: " +
+           link_.settings().connection.address();
+  return "the drive has not taken neutral and may still be on: " + link_.describe(release_.answer);
 }
 
 std::string ModbusActuator::reason() const {
+  if (last_fault_ == Fault::none) return "";
   if (violated_ != no_rule) {
     const HealthRule& rule = settings_.health[violated_];
     std::ostringstream text;
@@ -180,7 +205,7 @@ std::string ModbusActuator::reason() const {
       text << " is " << health_[violated_].value << ", must be " << rule.comparison.text();
     return text.str();
   }
-  const std::string failure = link_.last_failure();
+  const std::string failure = link_.recent_failure();
   if (last_fault_ == Fault::timeout && failure.empty())
     return "the device does not keep up with the loop";
   return failure;

@@ -61,6 +61,7 @@ class ModbusActuator final : public Actuator {
   // destructor.
   void release() noexcept override;
   bool released() const noexcept { return released_; }
+  std::string not_released() const;  // what it has not taken; empty when it is released
 
   // Why the last command had a fault; empty when it had none. Not for the loop.
   std::string reason() const;
@@ -83,6 +84,7 @@ class ModbusActuator final : public Actuator {
   bool ages_begin_ = false;  // with the next write()
   bool started_ = false;
   bool released_ = true;
+  Link::Released release_;  // the last one
 };
 
 class ModbusSensor final : public Sensor {

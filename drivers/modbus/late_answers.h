@@ -18,11 +18,12 @@ class LateAnswers {
   // Whether a late answer could be taken for the one to `request`, which reads.
   bool could_be(const Request& request, std::int64_t now_ns) const noexcept;
 
-  // One has come, and is known by its function code and length.
-  void forget(std::span<const std::uint8_t> pdu) noexcept;
+  // One has come, and is known by its function code and length; false: it is none of them.
+  bool forget(std::span<const std::uint8_t> pdu) noexcept;
 
-  // One has come unread: which one is known only where a single one was due.
-  void one_came(std::int64_t now_ns) noexcept;
+  // Forgets one that lies whole, with its check sum, in what came between two questions; where it
+  // ends there, 0 if there is none. A byte of noise is none.
+  std::size_t take_from(std::span<const std::uint8_t> bytes) noexcept;
 
   void clear() noexcept { late_.fill({}); }
 

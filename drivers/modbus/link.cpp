@@ -65,9 +65,32 @@ void Link::serve_one() noexcept {
 void Link::reconnect_now_and_then() noexcept {
   const std::int64_t now_ns = monotonic_now_ns();
   if (now_ns < next_reconnect_ns_) return;
-  if (transport_.try_connect()) pause_ns_ = first_pause_ns;
+  if (connect_and_hear()) pause_ns_ = first_pause_ns;
   next_reconnect_ns_ = monotonic_now_ns() + pause_ns_;
   if (!transport_.connected()) pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
+}
+
+// Many a device that has stopped reading is still connected to by its system, and would carry out,
+// later, what it was sent. It gets set-points again when it has answered something harmless.
+bool Link::connect_and_hear() noexcept {
+  if (!transport_.try_connect()) return false;
+  if (settings_.connection.serial) return true;
+  const std::int64_t deadline_ns = monotonic_now_ns() + settings_.response_timeout_ns;
+  const Answer answer =
+      reading_plan_.questions.empty()
+          ? write_number(transport_, *command_, neutral_, settings_.writing, deadline_ns)
+          : transport_.ask(reading_plan_.questions.front(), deadline_ns, registers_);
+  if (answer.outcome != Outcome::timeout) return transport_.connected();
+  note_failure(answer);
+  transport_.give_up();
+  return false;
+}
+
+// Why the connection went is worth more than that it is still gone.
+void Link::note_failure(const Answer& answer) noexcept {
+  if (answer.error != ENOTCONN) failure_ = answer;
+  has_failed_ = true;
+  failure_ns_ = monotonic_now_ns();
 }
 
 void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& exchange) noexcept {
@@ -90,8 +113,8 @@ void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& excha
     if (n > 0 && monotonic_now_ns() >= deadline_ns) {
       for (std::size_t i = 0; i < plan.fields.size(); ++i)
         if (plan.fields[i].question >= n) exchange.fields[i].fault = Fault::timeout;
-      if (!failed) failure_ = Answer{.outcome = Outcome::timeout};
-      failed = lost = has_failed_ = true;
+      if (!failed) note_failure(Answer{.outcome = Outcome::timeout});
+      failed = lost = true;
       break;
     }
     Request question = plan.questions[n];
@@ -113,9 +136,7 @@ void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& excha
     lost = lost || (answer.outcome != Outcome::ok && !answer.withheld);
     if (answer.outcome != Outcome::ok) {
       failed = true;
-      // Why the connection went is worth more than that it is still gone.
-      if (answer.error != ENOTCONN) failure_ = answer;
-      has_failed_ = true;
+      note_failure(answer);
     }
     for (std::size_t i = 0; i < plan.fields.size(); ++i) {
       const Field& field = plan.fields[i];
@@ -155,6 +176,18 @@ Pace Link::pace() const {
 TransportCounters Link::counters() const {
   const std::scoped_lock lock{mutex_};
   return transport_.counters();
+}
+
+std::string Link::recent_failure() const {
+  constexpr std::int64_t news_ns = 1'000'000'000;
+  const std::scoped_lock lock{mutex_};
+  const bool recent = has_failed_ && failure_ns_ > tick_ns_ - news_ns;
+  return recent ? transport_.describe(failure_) : "";
+}
+
+std::string Link::describe(const Answer& answer) const {
+  const std::scoped_lock lock{mutex_};
+  return transport_.describe(answer);
 }
 
 std::string Link::last_failure() const {

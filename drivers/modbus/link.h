@@ -24,6 +24,10 @@
 
 namespace sinerig::modbus {
 
+// Part of a period that an exchange may wait for its answers.
+inline constexpr double usual_timeout = 0.75;
+inline constexpr double longest_timeout = 0.9;
+
 struct LinkSettings {
   ConnectionSettings connection;
   Writing writing = Writing::automatic;
@@ -44,7 +48,10 @@ class Link {
 
   // Before open(): a number to be read at every tick; its index among the fields of an exchange.
   std::size_t watch(const Place& place, std::string label);
-  void command(const Place& place) { command_ = place; }
+  void command(const Place& place, double neutral) {
+    command_ = place;
+    neutral_ = neutral;
+  }
 
   // Connects, reads everything once, starts the thread. Throws std::runtime_error; StopRequested,
   // as try_out(), where a stop is.
@@ -57,7 +64,8 @@ class Link {
     return use(transport_);
   }
 
-  // Where the connection is gone, outside the loop. Throws std::runtime_error.
+  // Outside the loop: a new connection in any case over TCP, where one can be gone and look whole;
+  // on a serial line where it is gone. Throws std::runtime_error.
   void reconnect();
 
   // Exchanges as in the loop, outside of it; with a command where one is given. Those that ask for
@@ -65,6 +73,10 @@ class Link {
   // where the device does not know it and the rig file leaves the choice.
   Pace try_out(std::optional<double> command, std::size_t exchanges);
   std::string last_failure() const;
+  // The same where it is of the last second before the newest tick; empty: what has happened since
+  // has another cause. Not while the loop runs.
+  std::string recent_failure() const;
+  std::string describe(const Answer& answer) const;
   Pace pace() const;  // of the loop so far
   TransportCounters counters() const;
 
@@ -85,9 +97,12 @@ class Link {
   struct Released {
     bool neutral = false;   // taken by the device
     bool disarmed = false;  // every step was
+    Answer answer{};        // to neutral
   };
 
-  // Neutral at once, whatever the loop has handed over, then `disarm`. Bounded in time.
+  // Neutral at once, whatever the loop has handed over, then `disarm`. Bounded in time. A
+  // connection that takes neutral no more than the set-points before it is given up with all that
+  // it holds.
   Released release(double neutral, const Sequence& disarm) noexcept;
 
   // Between two runs of the loop: an exchange that ended before is none of the next one's.
@@ -111,6 +126,8 @@ class Link {
   void make_plans();
   void find_spare_registers();
   void reconnect_now_and_then() noexcept;
+  bool connect_and_hear() noexcept;
+  void note_failure(const Answer& answer) noexcept;
 
   // Between two attempts: a device that restarts is often back after a few ticks.
   static constexpr std::int64_t first_pause_ns = 10'000'000;
@@ -121,6 +138,7 @@ class Link {
   std::vector<Place> places_;
   std::vector<std::string> labels_;
   std::optional<Place> command_;
+  double neutral_ = 0.0;
 
   // The loop's.
   Mailbox<Order> orders_;      // loop → thread
@@ -143,6 +161,7 @@ class Link {
   PaceRecord pace_;
   Answer failure_;
   bool has_failed_ = false;
+  std::int64_t failure_ns_ = 0;
   std::int64_t next_reconnect_ns_ = 0;
   std::int64_t pause_ns_ = first_pause_ns;
 

@@ -118,6 +118,7 @@ void Link::open() {
 
 void Link::reconnect() {
   const std::scoped_lock lock{mutex_};
+  if (!settings_.connection.serial) transport_.give_up();
   if (transport_.connected() || transport_.try_connect()) return;
   throw std::runtime_error(settings_.connection.address() +
                            ": no connection; is the device powered and on the network?");
@@ -131,6 +132,8 @@ Pace Link::try_out(std::optional<double> command, std::size_t exchanges) {
   while (asked < exchanges && failed < most_failures && transport_.connected()) {
     waiting_.go_on();
     Exchange exchange;
+    // In the loop it has passed by the next tick.
+    transport_.keep_silence(monotonic_now_ns() + trial_ns);
     const Order order{.number = 0,
                       .handed_over_ns = monotonic_now_ns(),
                       .commands = command.has_value(),
@@ -185,15 +188,21 @@ Link::Released Link::release(double neutral, const Sequence& disarm) noexcept {
   const std::scoped_lock lock{mutex_};
   drop_exchanges();
   commanded_ = false;
-  if (!command_) return {.neutral = true, .disarmed = true};
+  if (!command_) return {.neutral = true, .disarmed = true, .answer = {}};
   Released released;
   for (int n = 0; n < release_tries && !released.neutral; ++n) {
-    if (!transport_.connected() && !transport_.try_connect()) continue;
-    const Answer answer = write_number(transport_, *command_, neutral, settings_.writing,
-                                       monotonic_now_ns() + release_answer_ns);
-    released.neutral = answer.outcome == Outcome::ok;
+    if (!transport_.connected() && !transport_.try_connect()) {
+      released.answer = Answer{.error = errno};
+      continue;
+    }
+    released.answer = write_number(transport_, *command_, neutral, settings_.writing,
+                                   monotonic_now_ns() + release_answer_ns);
+    released.neutral = released.answer.outcome == Outcome::ok;
+    // From here on nothing but neutral and the list is in the connection.
+    const bool silent = released.answer.outcome == Outcome::timeout;
+    if (n == 0 && silent && !settings_.connection.serial) transport_.give_up();
   }
-  released.disarmed = transport_.connected() && run_all(transport_, disarm, waiting_);
+  released.disarmed = run_all(transport_, disarm, waiting_);
   return released;
 }
 

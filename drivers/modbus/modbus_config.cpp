@@ -1,9 +1,11 @@
 #include "drivers/modbus/modbus_config.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
+#include <sstream>
+
+#include "drivers/modbus/line_rates.h"
 
 namespace sinerig::modbus {
 namespace {
@@ -17,15 +19,6 @@ constexpr Range a_register{.min = 0.0, .max = 65535.0};
 constexpr Range a_unit{.min = 0.0, .max = 255.0};
 // On a serial line 0 is for everybody, and nobody answers; 248 to 255 are reserved.
 constexpr Range a_serial_unit{.min = 1.0, .max = 247.0};
-
-// The rates that libmodbus sets; it takes any other for 9600 without a word.
-constexpr std::array bauds = {1200,   2400,    4800,    9600,    19200,   38400,
-                              57600,  115200,  230400,  460800,  500000,  576000,
-                              921600, 1000000, 1152000, 1500000, 2000000, 2500000};
-
-// Part of a period that an exchange may wait for its answers.
-constexpr double usual_timeout = 0.75;
-constexpr double longest_timeout = 0.9;
 
 std::int64_t nanoseconds(double seconds) {
   return std::llround(seconds * 1e9);
@@ -91,7 +84,7 @@ Step read_step(const Section& section, const Connection& connection) {
   Step step;
   step.name = section.text("name");
   step.place = read_source(section, connection);
-  step.single = connection.link.writing == Writing::single;
+  step.writing = connection.link.writing;
   if (section.has("value")) step.write = section.number("value", any_number);
   step.expect = read_comparison(section);
   step.timeout_ns =
@@ -99,7 +92,7 @@ Step read_step(const Section& section, const Connection& connection) {
   step.delay_ns = nanoseconds(section.number("delay_s", {.min = 0.0, .max = 60.0}, 0.0));
   if (step.write && step.place.table == Table::input)
     section.refuse("table", "input registers can't be written");
-  if (step.write && step.single && step.place.words() > 1)
+  if (step.write && step.writing == Writing::single && step.place.words() > 1)
     section.refuse("type", "function 6 writes one register; exchange = \"fc16\" writes more");
   return step;
 }
@@ -112,6 +105,22 @@ Sequence read_sequence(const Section& section, std::string_view list,
   return sequence;
 }
 
+void require_limits_within(const config::Rig& rig, const CommandSettings& settings) {
+  const Span registers = span_of(settings.place.format);
+  const double rounding = 1e-6 * std::abs(settings.place.format.scale);
+  const MotionLimits& motion = rig.motion;
+  const auto require = [&](const char* key, double low, double high) {
+    if (motion.command_min >= low - rounding && motion.command_max <= high + rounding) return;
+    std::ostringstream rule;
+    rule << "the command goes out as " << low << " to " << high
+         << ": set [limits] command_min and command_max within";
+    rig.actuator.section.refuse(key, rule.str());
+  };
+  require("type", registers.low, registers.high);
+  require(std::isfinite(settings.minimum) ? "clamp_min" : "clamp_max", settings.minimum,
+          settings.maximum);
+}
+
 void read_address(const Section& section, ConnectionSettings& settings) {
   settings.serial = section.choice("transport", {"tcp", "rtu"}) == "rtu";
   if (!settings.serial) {
@@ -121,14 +130,18 @@ void read_address(const Section& section, ConnectionSettings& settings) {
   }
   settings.device = section.text("device");
   settings.baud = static_cast<int>(section.integer("baud", {.min = 1200.0, .max = 2.5e6}, 115200));
-  if (std::ranges::find(bauds, settings.baud) == bauds.end()) {
+  if (std::ranges::find(line_rates, settings.baud, &LineRate::baud) == line_rates.end()) {
     std::string rule = "must be one of";
-    for (const int baud : bauds) rule.append(" ").append(std::to_string(baud));
+    for (const LineRate& rate : line_rates) rule.append(" ").append(std::to_string(rate.baud));
     section.refuse("baud", rule);
   }
   const std::string parity = section.choice("parity", {"even", "none", "odd"});
   settings.parity = parity == "none" ? 'N' : parity == "odd" ? 'O' : 'E';
   settings.stop_bits = static_cast<int>(section.integer("stop_bits", {.min = 1.0, .max = 2.0}, 1));
+  // 3.5 characters of 11 bits; above 19200 baud the standard recommends one time for all.
+  const double silence_s = std::max(1.75e-3, 3.5 * 11.0 / settings.baud);
+  settings.silence_ns =
+      nanoseconds(section.number("silence_s", {.min = 0.0, .max = 0.1}, silence_s));
   const std::string rs485 = section.choice("rs485", {"adapter", "kernel", "rts_up", "rts_down"});
   settings.rs485 = rs485 == "kernel"     ? Rs485::kernel
                    : rs485 == "rts_up"   ? Rs485::rts_up
@@ -161,8 +174,8 @@ Connection read_connection(const Section& section, double rate_hz) {
   return connection;
 }
 
-CommandSettings read_command(const Section& section, const Connection& connection, double neutral,
-                             std::int64_t max_age_ns) {
+CommandSettings read_command(const config::Rig& rig, const Connection& connection) {
+  const Section& section = rig.actuator.section;
   CommandSettings settings;
   settings.place = read_place(section, connection);
   if (connection.link.writing == Writing::single && settings.place.words() > 1)
@@ -171,8 +184,9 @@ CommandSettings read_command(const Section& section, const Connection& connectio
   settings.maximum = section.number("clamp_max", any_number, settings.maximum);
   if (!(settings.minimum < settings.maximum))
     section.refuse("clamp_min", "must be below clamp_max");
-  settings.neutral = neutral;
-  settings.max_age_ns = max_age_ns;
+  require_limits_within(rig, settings);
+  settings.neutral = rig.guard.neutral;
+  settings.max_age_ns = rig.guard.max_age_ns;
   settings.startup = read_sequence(section, "startup", connection);
   settings.arm = read_sequence(section, "arm", connection);
   settings.disarm = read_sequence(section, "disarm", connection);

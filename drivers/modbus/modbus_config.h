@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "config/rig.h"
 #include "config/section.h"
 #include "drivers/modbus/channels.h"
 
@@ -15,8 +16,9 @@ struct Connection {
 };
 Connection read_connection(const config::Section& section, double rate_hz);
 
-CommandSettings read_command(const config::Section& section, const Connection& connection,
-                             double neutral, std::int64_t max_age_ns);
+// The rig's actuator. Its limits must be within what the registers and the clamps can say: a guard
+// that admits more would see half a sine, or no neutral.
+CommandSettings read_command(const config::Rig& rig, const Connection& connection);
 FeedbackSettings read_feedback(const config::Section& section, const Connection& connection);
 
 }  // namespace sinerig::modbus

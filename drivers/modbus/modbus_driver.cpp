@@ -23,8 +23,7 @@ class ModbusDevice final : public Device {
     if (request.actuator != nullptr) {
       const Section& section = request.actuator->section;
       command_connection_ = connection_of(section);
-      command_ = read_command(section, connections_[command_connection_], request.rig.guard.neutral,
-                              request.rig.guard.max_age_ns);
+      command_ = read_command(request.rig, connections_[command_connection_]);
     }
     for (const config::Channel* sensor : request.sensors) {
       const std::size_t connection = connection_of(sensor->section);
@@ -77,6 +76,8 @@ class ModbusDevice final : public Device {
     if (actuator_) actuator_->release();
   }
 
+  std::string not_released() const override { return actuator_ ? actuator_->not_released() : ""; }
+
   void catch_up() override {
     for (const auto& link : links_) link->forget();
   }
@@ -87,7 +88,7 @@ class ModbusDevice final : public Device {
   std::string fault_reason() const override {
     if (actuator_ && !actuator_->reason().empty()) return actuator_->reason();
     for (const auto& link : links_)
-      if (const std::string failure = link->last_failure(); !failure.empty()) return failure;
+      if (const std::string failure = link->recent_failure(); !failure.empty()) return failure;
     return "";
   }
 

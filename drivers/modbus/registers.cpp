@@ -40,6 +40,27 @@ std::uint64_t nearest(double code, double& meant) noexcept {
 
 }  // namespace
 
+Span span_of(const Format& format) noexcept {
+  const auto of_codes = [&](auto least, auto greatest) -> Span {
+    const double one = static_cast<double>(least) * format.scale + format.offset;
+    const double other = static_cast<double>(greatest) * format.scale + format.offset;
+    return {.low = std::min(one, other), .high = std::max(one, other)};
+  };
+  const auto of_integers = [&]<class Integer>(Integer) {
+    return of_codes(std::numeric_limits<Integer>::min(), std::numeric_limits<Integer>::max());
+  };
+  switch (format.type) {
+    case RegisterType::int16: return of_integers(std::int16_t{});
+    case RegisterType::uint16: return of_integers(std::uint16_t{});
+    case RegisterType::int32: return of_integers(std::int32_t{});
+    case RegisterType::uint32: return of_integers(std::uint32_t{});
+    case RegisterType::float32:
+    case RegisterType::float64: break;
+  }
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  return {.low = -infinite, .high = infinite};
+}
+
 double decode(std::span<const std::uint16_t> registers, const Format& format) noexcept {
   const std::uint64_t raw = gather(registers, format);
   double code = 0.0;

@@ -42,6 +42,13 @@ constexpr std::size_t words_of(RegisterType type) noexcept {
 // The value in words_of(format.type) registers. Not a number where a float register holds none.
 double decode(std::span<const std::uint16_t> registers, const Format& format) noexcept;
 
+// The least and the greatest value that the registers can say; infinite for floats.
+struct Span {
+  double low = 0.0;
+  double high = 0.0;
+};
+Span span_of(const Format& format) noexcept;
+
 // Writes the nearest code, at the end of the type's range where `value` lies beyond it, and returns
 // what that code means. `value` must be a number.
 double encode(std::span<std::uint16_t> registers, const Format& format, double value) noexcept;

@@ -17,14 +17,15 @@ struct Comparison {
   Operator sign = Operator::equal;
   double value = 0.0;
 
-  bool holds(double measured) const noexcept;
+  // Of a number read in this format: equal is what is the same code. NaN holds for nothing.
+  bool holds(double measured, const Format& format) const noexcept;
   std::string text() const;  // "= 1"
 };
 
 struct Step {
   std::string name;
   Place place;
-  bool single = false;  // written by function 6 instead of 16
+  Writing writing = Writing::multiple;
   std::optional<double> write;
   std::optional<Comparison> expect;  // read again until it holds
   std::int64_t timeout_ns = 500'000'000;
@@ -40,8 +41,13 @@ void run(Transport& transport, const Sequence& sequence, const std::string& list
 // Every step whatever becomes of the others, for ways out. True when all was done.
 bool run_all(Transport& transport, const Sequence& sequence, const Waiting& waiting = {}) noexcept;
 
-// Writes one number; `deadline_ns` as Transport::ask.
+// Writes one number: by function 16, or 6 for Writing::single; where the device knows no 16 and the
+// loop writes by 23 or may, by 23. `deadline_ns` as Transport::ask.
 Answer write_number(Transport& transport, const Place& place, double value, Writing writing,
                     std::int64_t deadline_ns) noexcept;
+
+// The same outside the loop, where a lost answer is worth a second try; a refusal is final.
+Answer write_surely(Transport& transport, const Place& place, double value,
+                    Writing writing) noexcept;
 
 }  // namespace sinerig::modbus

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <poll.h>
 #include <stdexcept>
-#include <termios.h>
 #include <unistd.h>
 #include <utility>
 
@@ -27,6 +27,10 @@ constexpr std::int64_t echo_quiet_ns = 50'000'000;
 // An answer that is this many time-outs late is taken for lost.
 constexpr std::int64_t latest_answer = 5;
 
+// Each waits in the connection to a device that has stopped reading, and is carried out when it
+// goes on. A single lost packet is made good for by the kernel once the next question follows it.
+constexpr int most_writes_waiting = 3;
+
 // libmodbus takes a timeout of 0 for a mistake, and one of a second or more in two parts.
 void set_response_timeout(modbus_t* context, std::int64_t timeout_ns) noexcept {
   const std::int64_t us = std::max<std::int64_t>(1, timeout_ns / 1000);
@@ -39,6 +43,14 @@ bool wait_for_input(int fd, std::int64_t until_ns) noexcept {
   const timespec left{.tv_sec = left_ns / ns_per_s, .tv_nsec = left_ns % ns_per_s};
   pollfd input{.fd = fd, .events = POLLIN, .revents = 0};
   return ppoll(&input, 1, &left, nullptr) > 0;
+}
+
+// As it goes out on a serial line.
+RequestBytes with_check_sum(RequestBytes request) noexcept {
+  const std::uint16_t crc = crc16(request.bytes());
+  request.data[request.size++] = static_cast<std::uint8_t>(crc & 0xFFU);
+  request.data[request.size++] = static_cast<std::uint8_t>(crc >> 8U);
+  return request;
 }
 
 }  // namespace
@@ -56,17 +68,43 @@ int Transport::pending() const noexcept {
 
 void Transport::clear_input() noexcept {
   if (settings_.serial) {
-    tcflush(socket(), TCIFLUSH);
+    take_in_late_answers();
   } else {
     modbus_flush(context_.get());
   }
 }
 
 void Transport::take_in_late_answers() noexcept {
-  if (!settings_.serial || pending() == 0) return;
-  clear_input();
-  ++counters_.late_answers;
-  late_.one_came(monotonic_now_ns());
+  if (!settings_.serial) return;
+  std::array<std::uint8_t, 256> bytes{};
+  while (pending() > 0) {
+    const ssize_t count = read(socket(), bytes.data(), bytes.size());
+    if (count <= 0) break;
+    busy_until_ns_ = monotonic_now_ns();
+    keep_stray(std::span{bytes}.first(static_cast<std::size_t>(count)));
+  }
+  while (const std::size_t end = late_.take_from(std::span{stray_}.first(stray_size_))) {
+    ++counters_.late_answers;
+    std::copy(stray_.begin() + static_cast<std::ptrdiff_t>(end),
+              stray_.begin() + static_cast<std::ptrdiff_t>(stray_size_), stray_.begin());
+    stray_size_ -= end;
+  }
+}
+
+// The newest of them, where there are more than any answer has.
+void Transport::keep_stray(std::span<const std::uint8_t> bytes) noexcept {
+  if (stray_size_ + bytes.size() > stray_.size()) stray_size_ = 0;
+  std::ranges::copy(bytes, stray_.begin() + static_cast<std::ptrdiff_t>(stray_size_));
+  stray_size_ += bytes.size();
+}
+
+// Without it those on the line take two frames for one, and drop both.
+void Transport::keep_silence(std::int64_t deadline_ns) const noexcept {
+  if (!settings_.serial) return;
+  const std::int64_t until_ns = std::min(busy_until_ns_ + settings_.silence_ns, deadline_ns);
+  const timespec until{.tv_sec = until_ns / ns_per_s, .tv_nsec = until_ns % ns_per_s};
+  while (monotonic_now_ns() < until_ns)
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
 }
 
 bool Transport::send(const RequestBytes& request) noexcept {
@@ -94,6 +132,8 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
   }
   Request request = wanted;
   take_in_late_answers();
+  keep_silence(deadline_ns);
+  take_in_late_answers();
   if (settings_.serial && late_.could_be(request, monotonic_now_ns())) {
     answer.outcome = Outcome::timeout;
     answer.withheld = true;
@@ -112,11 +152,10 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
     disconnect();
     return answer;
   }
-  if (echoes_ && !discard_echo(bytes.size + crc_bytes, deadline_ns))
-    answer.outcome = Outcome::timeout;
-  else
-    receive(request, deadline_ns, registers, answer);
+  answer.outcome = echoes_ ? discard_echo(bytes, deadline_ns) : Outcome::ok;
+  if (answer.outcome == Outcome::ok) receive(request, deadline_ns, registers, answer);
   answer.received_ns = monotonic_now_ns();
+  busy_until_ns_ = answer.received_ns;
 
   const std::int64_t earliest_ns = answer.sent_ns + wire_ns(bytes.size + crc_bytes);
   const std::int64_t latest_ns = answer.received_ns - wire_ns(1 + reply_size(request) + crc_bytes);
@@ -135,7 +174,20 @@ Answer Transport::ask(const Request& wanted, std::int64_t deadline_ns,
     clear_input();
   }
   if (answer.outcome == Outcome::disconnected) disconnect();
+  const bool write_waits =
+      !settings_.serial && request.writes() && answer.outcome == Outcome::timeout;
+  if (write_waits && ++writes_waiting_ >= most_writes_waiting) give_up();
   return answer;
+}
+
+// An answer, whenever it comes, shows that everything before its question has been read.
+void Transport::note_answer(std::uint16_t number) noexcept {
+  const auto since = static_cast<std::uint16_t>(transaction_ - number);
+  const auto waiting = static_cast<std::uint16_t>(transaction_ - answered_);
+  if (since >= waiting) return;
+  answered_ = number;
+  // Those between it and the newest, which is being waited for.
+  writes_waiting_ = std::min(writes_waiting_, std::max(0, since - 1));
 }
 
 void Transport::receive(const Request& request, std::int64_t deadline_ns,
@@ -155,12 +207,14 @@ void Transport::receive(const Request& request, std::int64_t deadline_ns,
       const bool nonsense =
           errno == EMBBADCRC || errno == EMBBADDATA || errno == EMBBADEXC || errno == EMBMDATA;
       answer.outcome = nonsense ? Outcome::spoiled : Outcome::disconnected;
+      if (nonsense) note_answer(transaction_);
       return;
     }
     const auto size = static_cast<std::size_t>(length);
     if (size <= header + trailer) continue;  // another device's
-    const bool ours =
-        settings_.serial ? frame[0] == request.unit : (frame[0] << 8U | frame[1]) == transaction_;
+    const auto number = static_cast<std::uint16_t>(frame[0] << 8U | frame[1]);
+    if (!settings_.serial) note_answer(number);
+    const bool ours = settings_.serial ? frame[0] == request.unit : number == transaction_;
     const std::span<const std::uint8_t> pdu{frame.data() + header, size - header - trailer};
     const Reply reply = ours ? read_reply(pdu, request, registers) : Reply{};
     if (reply.kind == ReplyKind::other) {
@@ -174,26 +228,29 @@ void Transport::receive(const Request& request, std::int64_t deadline_ns,
   }
 }
 
-bool Transport::discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept {
-  std::array<std::uint8_t, 64> echo{};
-  while (bytes > 0) {
-    if (!wait_for_input(socket(), deadline_ns)) return false;
-    const ssize_t count = read(socket(), echo.data(), std::min(bytes, echo.size()));
-    if (count <= 0) return false;
-    bytes -= static_cast<std::size_t>(count);
+// What comes in the place of an echo is a late answer, or noise before it.
+Outcome Transport::discard_echo(const RequestBytes& request, std::int64_t deadline_ns) noexcept {
+  const RequestBytes sent = with_check_sum(request);
+  std::array<std::uint8_t, sizeof(sent.data)> echo{};
+  std::size_t size = 0;
+  while (size < sent.size) {
+    if (!wait_for_input(socket(), deadline_ns)) return Outcome::timeout;
+    const ssize_t count = read(socket(), echo.data() + size, sent.size - size);
+    if (count <= 0) return Outcome::timeout;
+    size += static_cast<std::size_t>(count);
   }
-  return true;
+  const auto came = std::span<const std::uint8_t>{echo}.first(size);
+  if (std::ranges::equal(came, sent.bytes())) return Outcome::ok;
+  keep_stray(came);
+  return Outcome::spoiled;
 }
 
 void Transport::look_for_echo(const Request& request) noexcept {
   echoes_ = false;
   if (!settings_.serial || !connected_) return;
   clear_input();
-  RequestBytes sent = bytes_of(request);
-  if (!send(sent)) return;
-  const std::uint16_t crc = crc16(sent.bytes());
-  sent.data[sent.size++] = static_cast<std::uint8_t>(crc & 0xFFU);
-  sent.data[sent.size++] = static_cast<std::uint8_t>(crc >> 8U);
+  if (!send(bytes_of(request))) return;
+  const RequestBytes sent = with_check_sum(bytes_of(request));
 
   const std::int64_t until_ns = monotonic_now_ns() + echo_wait_ns;
   std::size_t same = 0;
@@ -210,6 +267,7 @@ void Transport::look_for_echo(const Request& request) noexcept {
     if (read(socket(), rest.data(), rest.size()) <= 0) break;
   }
   late_.clear();
+  stray_size_ = 0;
 }
 
 std::string Transport::describe(const Answer& answer) const {

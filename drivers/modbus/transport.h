@@ -8,6 +8,7 @@
 // Not thread-safe. Nothing in it is for the loop.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -34,6 +35,7 @@ struct ConnectionSettings {
   char parity = 'E';  // 'N', 'E' or 'O'
   int stop_bits = 1;
   Rs485 rs485 = Rs485::adapter;
+  std::int64_t silence_ns = 0;  // before a request: it ends a frame on a serial line
 
   std::string address() const { return serial ? device : host + ":" + std::to_string(port); }
 };
@@ -74,16 +76,26 @@ class Transport {
   Transport(const Transport&) = delete;
   Transport& operator=(const Transport&) = delete;
 
-  // Throws std::runtime_error saying what to look at.
+  // Looks the host up; throws std::runtime_error saying what to look at.
   void connect();
+  // Again, at the address that connect() has found.
   bool try_connect() noexcept;
+  // What the device has not answered is dropped with the connection, see give_up().
   void disconnect() noexcept;
+  // TCP: whatever still waits to be delivered is thrown away (RST). Ended in the ordinary way, a
+  // connection delivers its set-points when the device reads again, seconds later.
+  void give_up() noexcept;
   bool connected() const noexcept { return connected_; }
 
   // Asks and waits until `deadline_ns` (CLOCK_MONOTONIC) at most; `registers` takes what is read.
-  // A lost connection is closed.
+  // A lost connection is closed; one of TCP is given up, too, after three writes that got no
+  // answer.
   Answer ask(const Request& request, std::int64_t deadline_ns,
              std::span<std::uint16_t> registers) noexcept;
+
+  // Serial lines: waits, until `deadline_ns` at most, for the silence that a question needs; ask()
+  // does it by itself.
+  void keep_silence(std::int64_t deadline_ns) const noexcept;
 
   // How long an answer may take as a rule: one to a question with less time left is late no sooner.
   void set_usual_patience(std::int64_t patience_ns) noexcept { usual_patience_ns_ = patience_ns; }
@@ -104,12 +116,15 @@ class Transport {
     void operator()(_modbus* context) const noexcept;
   };
 
+  bool runs_at_its_rate() const noexcept;
   bool switch_transmitter() noexcept;
   bool send(const RequestBytes& request) noexcept;
+  void note_answer(std::uint16_t number) noexcept;
   void receive(const Request& request, std::int64_t deadline_ns, std::span<std::uint16_t> registers,
                Answer& answer) noexcept;
-  bool discard_echo(std::size_t bytes, std::int64_t deadline_ns) noexcept;
+  Outcome discard_echo(const RequestBytes& request, std::int64_t deadline_ns) noexcept;
   void take_in_late_answers() noexcept;
+  void keep_stray(std::span<const std::uint8_t> bytes) noexcept;
   void clear_input() noexcept;
   int pending() const noexcept;
   int socket() const noexcept;
@@ -117,11 +132,18 @@ class Transport {
   ConnectionSettings settings_;
   std::unique_ptr<_modbus, Close> context_;
   TransportCounters counters_;
-  std::uint16_t transaction_ = 0;
+  std::string found_host_;         // its address, as connect() has found it
+  std::uint16_t transaction_ = 0;  // of the newest question, TCP
+  std::uint16_t answered_ = 0;     // newest question that got an answer, TCP
+  int writes_waiting_ = 0;         // for an answer, TCP
   std::int64_t usual_patience_ns_ = 0;
   bool connected_ = false;
   bool echoes_ = false;
   LateAnswers late_;  // serial lines
+  // Serial lines: what came between two questions, in which a late answer may not be whole yet.
+  std::array<std::uint8_t, 512> stray_{};
+  std::size_t stray_size_ = 0;
+  std::int64_t busy_until_ns_ = 0;  // the line, as far as it is known
 };
 
 }  // namespace sinerig::modbus

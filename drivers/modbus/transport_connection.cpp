@@ -1,17 +1,54 @@
 // How a connection is made and ended; transport.cpp asks and waits on it.
+#include <algorithm>
 #include <cerrno>
+#include <netdb.h>
 #include <stdexcept>
+#include <unistd.h>
 #include <utility>
+#include <vector>
 
 #include <modbus/modbus.h>
 #include <sys/ioctl.h>
+#include <sys/socket.h>
 
+#include "drivers/modbus/line_rates.h"
 #include "drivers/modbus/transport.h"
 
 namespace sinerig::modbus {
 namespace {
 
 constexpr std::uint32_t connect_timeout_us = 300'000;
+
+// What a close does with bytes that are still to be delivered: dropped with the connection (RST),
+// or sent on by the kernel. Set from the beginning: it holds for a process that is killed, too.
+void drop_what_waits(int socket, bool drop) noexcept {
+  const linger how{.l_onoff = drop ? 1 : 0, .l_linger = 0};
+  setsockopt(socket, SOL_SOCKET, SO_LINGER, &how, sizeof how);
+}
+
+// Numbers only: a look-up may take seconds, and connections are made again between two ticks. Empty
+// where the name is not known.
+std::vector<std::string> addresses_of(const std::string& host) {
+  const addrinfo wanted{.ai_flags = AI_ADDRCONFIG,
+                        .ai_family = AF_UNSPEC,
+                        .ai_socktype = SOCK_STREAM,
+                        .ai_protocol = 0,
+                        .ai_addrlen = 0,
+                        .ai_addr = nullptr,
+                        .ai_canonname = nullptr,
+                        .ai_next = nullptr};
+  addrinfo* found = nullptr;
+  if (getaddrinfo(host.c_str(), nullptr, &wanted, &found) != 0) return {};
+  std::vector<std::string> addresses;
+  for (const addrinfo* one = found; one != nullptr; one = one->ai_next) {
+    char text[NI_MAXHOST];
+    if (getnameinfo(one->ai_addr, one->ai_addrlen, text, sizeof text, nullptr, 0, NI_NUMERICHOST) ==
+        0)
+      addresses.emplace_back(text);
+  }
+  freeaddrinfo(found);
+  return addresses;
+}
 
 }  // namespace
 
@@ -22,13 +59,26 @@ void Transport::Close::operator()(modbus_t* context) const noexcept {
 
 Transport::Transport(ConnectionSettings settings) : settings_{std::move(settings)} {}
 
-Transport::~Transport() = default;
+Transport::~Transport() {
+  disconnect();
+}
 
 int Transport::socket() const noexcept {
   return modbus_get_socket(context_.get());
 }
 
 void Transport::disconnect() noexcept {
+  if (connected_ && !settings_.serial && transaction_ == answered_)
+    drop_what_waits(socket(), false);
+  give_up();
+}
+
+// libmodbus would say good-bye first, in good order behind what waits.
+void Transport::give_up() noexcept {
+  if (connected_ && !settings_.serial) {
+    close(socket());
+    modbus_set_socket(context_.get(), -1);
+  }
   context_.reset();
   connected_ = false;
 }
@@ -39,8 +89,7 @@ bool Transport::try_connect() noexcept {
     context_.reset(modbus_new_rtu(settings_.device.c_str(), settings_.baud, settings_.parity, 8,
                                   settings_.stop_bits));
   } else {
-    context_.reset(
-        modbus_new_tcp_pi(settings_.host.c_str(), std::to_string(settings_.port).c_str()));
+    context_.reset(modbus_new_tcp_pi(found_host_.c_str(), std::to_string(settings_.port).c_str()));
   }
   if (!context_) return false;
   modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
@@ -53,16 +102,30 @@ bool Transport::try_connect() noexcept {
     errno = error;
     return false;
   }
-  if (settings_.serial && !switch_transmitter()) {
+  if (settings_.serial && (!runs_at_its_rate() || !switch_transmitter())) {
     const int error = errno;
     context_.reset();
     errno = error;
     return false;
   }
+  if (!settings_.serial) drop_what_waits(socket(), true);
   connected_ = true;
+  answered_ = transaction_;
+  writes_waiting_ = 0;
   late_.clear();
+  stray_size_ = 0;
   ++counters_.connections;
   return true;
+}
+
+// False, and errno, where the port has another rate than it was told: nothing would be understood.
+bool Transport::runs_at_its_rate() const noexcept {
+  const auto* const rate = std::ranges::find(line_rates, settings_.baud, &LineRate::baud);
+  termios port{};
+  if (tcgetattr(socket(), &port) != 0) return false;
+  errno = ERANGE;
+  return rate != line_rates.end() && cfgetospeed(&port) == rate->speed &&
+         cfgetispeed(&port) == rate->speed;
 }
 
 // False, and errno, where the port cannot switch it as the rig file says.
@@ -78,13 +141,26 @@ bool Transport::switch_transmitter() noexcept {
 }
 
 void Transport::connect() {
-  if (try_connect()) return;
-  const int error = errno;
   const std::string where = "[modbus." + settings_.name + "] " + settings_.address() + ": ";
+  if (settings_.serial) {
+    if (try_connect()) return;
+  } else {
+    const std::vector<std::string> addresses = addresses_of(settings_.host);
+    if (addresses.empty())
+      throw std::runtime_error(where + "nobody knows this host: is its name right?");
+    for (const std::string& address : addresses) {
+      found_host_ = address;
+      if (try_connect()) return;
+    }
+  }
+  const int error = errno;
   const std::string why = modbus_strerror(error);
   if (!settings_.serial)
     throw std::runtime_error(where + "no connection (" + why +
                              "): is the device on, are host and port right?");
+  if (error == ERANGE)
+    throw std::runtime_error(where + "this serial port does not run at " +
+                             std::to_string(settings_.baud) + " baud");
   const bool refused = error == ENOTTY || error == EINVAL;
   if (settings_.rs485 == Rs485::kernel && refused)
     throw std::runtime_error(where + "this serial port has no RS-485 mode (" + why +

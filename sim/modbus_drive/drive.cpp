@@ -195,6 +195,7 @@ Bytes Drive::answer(std::span<const std::uint8_t> pdu, std::int64_t time_ns) {
       return wrong == 0 ? echo() : refusal(function, wrong);
     }
     case 16: {
+      if (!settings_.has_function_16) return refusal(function, illegal_function);
       if (pdu.size() < 6 || pdu[5] != 2 * word(pdu, 3) || pdu.size() != 6U + pdu[5])
         return refusal(function, illegal_value);
       const std::uint8_t wrong = write(word(pdu, 1), pdu.subspan(6), time_ns);

@@ -6,6 +6,7 @@
 
 #include <system_error>
 
+#include "drivers/monotonic_time.h"
 #include "sim/modbus_drive/line.h"
 
 namespace sinerig::sim {
@@ -104,6 +105,10 @@ class SerialLine final : public Line {
       input_.clear();  // whatever follows begins with the next silence
       return;
     }
+    if (monotonic_now_ns() - last_put_ns_ < settings_.silence_ns) {
+      input_.clear();  // the end of a frame that began with the reply
+      return;
+    }
     if (settings_.echo) put(Bytes(input_.begin(), body_end + 2));
     frames.push_back(
         {.from = 0, .number = 0, .unit = body[0], .pdu = Bytes(body.begin() + 1, body.end())});
@@ -111,6 +116,7 @@ class SerialLine final : public Line {
   }
 
   void put(const Bytes& bytes) {
+    last_put_ns_ = monotonic_now_ns();
     [[maybe_unused]] const ssize_t written = write(master_, bytes.data(), bytes.size());
   }
 
@@ -140,6 +146,7 @@ class SerialLine final : public Line {
   int master_ = -1;
   int slave_ = -1;
   Bytes input_;
+  std::int64_t last_put_ns_ = 0;
 };
 
 }  // namespace

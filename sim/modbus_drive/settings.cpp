@@ -41,6 +41,8 @@ DriveSettings read_drive(config::RigFile& file) {
     settings.bits_per_byte =
         static_cast<int>(drive.integer("bits_per_byte", {.min = 10.0, .max = 12.0}, 11));
     settings.echo = drive.flag("echo", false);
+    settings.silence_ns =
+        std::llround(drive.number("silence_s", {.min = 0.0, .max = 0.1}, 0.0) * 1e9);
   } else {
     settings.host = drive.text("host", settings.host);
     settings.port = static_cast<int>(drive.integer("port", {.min = 0.0, .max = 65535.0}, 0));
@@ -54,6 +56,7 @@ DriveSettings read_drive(config::RigFile& file) {
   settings.torque_scale = drive.number("torque_scale", above_zero, 1.0);
   settings.position_scale = drive.number("position_scale", above_zero, 1.0);
   settings.velocity_scale = drive.number("velocity_scale", above_zero, 1.0);
+  settings.has_function_16 = drive.flag("function_16", true);
   settings.has_function_23 = drive.flag("function_23", true);
   settings.turn_around_ns =
       std::llround(drive.number("turn_around_s", {.min = 0.0, .max = 1.0}, 0.0) * 1e9);

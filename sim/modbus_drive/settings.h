@@ -32,7 +32,8 @@ struct DriveSettings {
   std::string link;   // serial: a symbolic link to the pseudo-terminal
   int baud = 115200;  // serial: what frames take on the wire
   int bits_per_byte = 11;
-  bool echo = false;  // serial: an adapter that returns what is sent
+  bool echo = false;            // serial: an adapter that returns what is sent
+  std::int64_t silence_ns = 0;  // serial: a request sooner after a reply is not heard
   std::uint8_t unit = 1;
   std::string type = "float32";
   bool low_word_first = false;
@@ -40,6 +41,7 @@ struct DriveSettings {
   double torque_scale = 1.0;  // Nm per code, of every type
   double position_scale = 1.0;
   double velocity_scale = 1.0;
+  bool has_function_16 = true;
   bool has_function_23 = true;
   std::int64_t turn_around_ns = 0;  // from the end of a request to the beginning of its reply
   double watchdog_s = 0.0;          // without a request for this long the drive trips; 0 = never

@@ -110,6 +110,13 @@ void ConfiguredRig::keep_released() noexcept {
   for (Part& part : parts_) part.device->keep_released();
 }
 
+std::string ConfiguredRig::not_released() const {
+  for (const Part& part : parts_) {
+    if (std::string missing = part.device->not_released(); !missing.empty()) return missing;
+  }
+  return {};
+}
+
 std::string ConfiguredRig::arm_again() {
   try {
     switch_on([](Device& device) { device.rearm(); });
@@ -136,10 +143,11 @@ bool ConfiguredRig::answers_command(std::size_t sensor) const {
   return false;
 }
 
-std::string ConfiguredRig::fault_reason() const {
+std::string ConfiguredRig::fault_reason(const Trip& trip) const {
   for (const Part& part : parts_) {
-    const std::string reason = part.device->fault_reason();
-    if (!reason.empty()) return reason;
+    const bool serves =
+        std::find(part.sensors.begin(), part.sensors.end(), trip.channel) != part.sensors.end();
+    if (trip.of_sensor() ? serves : part.actuates) return part.device->fault_reason();
   }
   return {};
 }

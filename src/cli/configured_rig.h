@@ -32,9 +32,10 @@ class ConfiguredRig final : public Rearm {
   // Where it throws, nothing is armed any more.
   void arm();
   void catch_up();  // with what has come since: right before the loop
-  std::string fault_reason() const override;
+  std::string fault_reason(const Trip& trip) const override;
   std::string arm_again() override;
   void keep_released() noexcept override;
+  std::string not_released() const override;
   std::vector<Remark> remarks() const;
   bool answers_command(std::size_t sensor) const;  // Device::answers_command()
   Actuator& actuator() { return *actuator_; }

@@ -48,7 +48,8 @@ std::string reason_of(const Played& played, const Outbox& outbox, const Configur
   std::string reason = describe(trip, configured.rig().sensor_names());
   const bool by_device =
       trip.cause == TripCause::actuator_fault || trip.cause == TripCause::channel_age;
-  if (by_device && !configured.fault_reason().empty()) reason += ": " + configured.fault_reason();
+  if (const std::string said = configured.fault_reason(trip); by_device && !said.empty())
+    reason += ": " + said;
   if (played.outcome.faults > 0 && trip.device_fault()) {
     reason +=
         " (" + std::to_string(played.outcome.faults) + " tries to arm again are spent, [retry])";
@@ -226,6 +227,10 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
              .reason = reason_of(played, outbox, configured),
              .sweep_file = writer->path(),
              .dropped_samples = rig.runner.record_samples ? outbox.dropped_samples() : 0};
+  if (const std::string missing = configured.not_released(); !missing.empty()) {
+    if (end.outcome == "done") end.outcome = "stopped";
+    end.reason += (end.reason.empty() ? "" : "; ") + missing;
+  }
   attended(service, for_at_most(most_desk_work), [&] {
     if (const std::string unsaid = put_down_end(*writer, end); !unsaid.empty()) {
       end.outcome = "stopped";

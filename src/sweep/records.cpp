@@ -69,6 +69,7 @@ const char* to_string(EventKind kind) noexcept {
     case EventKind::rearmed: return "rearmed";
     case EventKind::preflight: return "preflight";
     case EventKind::released: return "released";
+    case EventKind::not_released: return "not_released";
     case EventKind::finished: return "finished";
   }
   return "unknown";

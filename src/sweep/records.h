@@ -159,6 +159,8 @@ enum class EventKind : std::uint8_t {
   rearmed,
   preflight,  // see Preflight
   released,
+  not_released,  // the actuator may go on with its last command; the note says what it has not
+                 // taken
   finished,
 };
 

@@ -18,9 +18,10 @@ Recovery::Recovery(const RetrySettings& settings, Clock& clock, RecordSink& sink
       faults_{settings.faults, settings.faults_in_all},
       soft_{settings.soft, settings.soft_in_all} {}
 
-Recovery::End Recovery::after_fault(std::uint32_t dwell, RunControl& control) noexcept {
-  const std::string reason = rearm_->fault_reason();
-  if (!reason.empty()) note(EventKind::device_fault, dwell, reason);
+Recovery::End Recovery::after_fault(const Trip& trip, std::uint32_t dwell,
+                                    RunControl& control) noexcept {
+  const std::string reason = rearm_->fault_reason(trip);
+  if (!reason.empty()) note(EventKind::device_fault, dwell, clock_.now().tick, reason);
   while (faults_.spend()) {
     sink_.put(Event{.kind = EventKind::rearming,
                     .dwell = dwell,
@@ -33,7 +34,7 @@ Recovery::End Recovery::after_fault(std::uint32_t dwell, RunControl& control) no
       sink_.put(Event{.kind = EventKind::rearmed, .dwell = dwell, .tick = clock_.now().tick});
       return End::armed;
     }
-    note(EventKind::rearm_failed, dwell, obstacle);
+    note(EventKind::rearm_failed, dwell, clock_.now().tick, obstacle);
   }
   return End::used_up;
 }
@@ -57,8 +58,18 @@ Recovery::End Recovery::wait(std::uint32_t dwell, RunControl& control) noexcept 
   return End::armed;
 }
 
-void Recovery::note(EventKind kind, std::uint32_t dwell, const std::string& text) noexcept {
-  Note note{.kind = kind, .dwell = dwell, .tick = clock_.now().tick};
+void Recovery::tell_release(std::uint32_t dwell, std::uint64_t tick) noexcept {
+  const std::string missing = rearm_ != nullptr ? rearm_->not_released() : std::string{};
+  if (missing.empty()) {
+    sink_.put(Event{.kind = EventKind::released, .dwell = dwell, .tick = tick});
+  } else {
+    note(EventKind::not_released, dwell, tick, missing);
+  }
+}
+
+void Recovery::note(EventKind kind, std::uint32_t dwell, std::uint64_t tick,
+                    const std::string& text) noexcept {
+  Note note{.kind = kind, .dwell = dwell, .tick = tick};
   std::copy_n(text.begin(), std::min(text.size(), note.text.size() - 1), note.text.begin());
   sink_.put(note);
 }

@@ -25,7 +25,10 @@ class Recovery {
   // With the actuator released, outside the loop: each wait goes by the clock, a stop request cuts
   // it short, that of arming, too:
   // then the device may be armed. Notes what it does.
-  End after_fault(std::uint32_t dwell, RunControl& control) noexcept;
+  End after_fault(const Trip& trip, std::uint32_t dwell, RunControl& control) noexcept;
+
+  // After a release: whether it was one, as far as anybody can tell.
+  void tell_release(std::uint32_t dwell, std::uint64_t tick) noexcept;
 
   // Whether a dwell that a soft limit has ended may be tried again.
   bool spend_soft() noexcept SINERIG_NONBLOCKING { return soft_.spend(); }
@@ -42,7 +45,8 @@ class Recovery {
 
  private:
   End wait(std::uint32_t dwell, RunControl& control) noexcept;
-  void note(EventKind kind, std::uint32_t dwell, const std::string& text) noexcept;
+  void note(EventKind kind, std::uint32_t dwell, std::uint64_t tick,
+            const std::string& text) noexcept;
 
   const RetrySettings& settings_;
   Clock& clock_;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "sweep/nonblocking.h"
+#include "sweep/trip.h"
 
 namespace sinerig {
 
@@ -54,11 +55,15 @@ class Rearm {
  public:
   virtual ~Rearm() = default;
 
-  // Why a device had a fault, for people; empty where it has nothing to say.
-  virtual std::string fault_reason() const = 0;
+  // What the device of the channel that has tripped says of it, for people; empty where it has
+  // nothing to say.
+  virtual std::string fault_reason(const Trip& trip) const = 0;
 
   // While it is waited: a release that could not be carried out, on a dead bus, is tried again.
   virtual void keep_released() noexcept {}
+
+  // What the actuator has not taken of its last release, for people; empty where it is released.
+  virtual std::string not_released() const { return {}; }
 
   // Empty when all devices are armed; else why not, and nothing is: a stop request, too.
   virtual std::string arm_again() = 0;

@@ -103,7 +103,7 @@ RunOutcome SweepRunner::run(RunControl& control) noexcept {
     }
     tell_trip(EventKind::tripped);
   }
-  announce({.kind = EventKind::released, .dwell = dwell_, .tick = last_tick_});
+  recovery_.tell_release(dwell_, last_tick_);
   announce({.kind = EventKind::finished, .dwell = dwell_, .tick = last_tick_});
   return outcome_;
 }

@@ -14,8 +14,8 @@ bool SweepRunner::recover(RunControl& control) noexcept {
   const bool probing = this->probing();
   if ((!under_way() && !probing) || !recovery_.worth_it(guard_.trip())) return false;
   tell_trip(EventKind::tripped);
-  announce({.kind = EventKind::released, .dwell = dwell_, .tick = last_tick_});
-  const Recovery::End end = recovery_.after_fault(dwell_, control);
+  recovery_.tell_release(dwell_, last_tick_);
+  const Recovery::End end = recovery_.after_fault(guard_.trip(), dwell_, control);
   last_tick_ = clock_.now().tick;
   if (end == Recovery::End::used_up) return false;
   guard_.resume();

@@ -139,7 +139,7 @@ Sample Night::read(std::size_t sensor) noexcept {
   return sample;
 }
 
-std::string Night::fault_reason() const {
+std::string Night::fault_reason(const Trip& /*trip*/) const {
   if (now() < lost_until_) return "the connection is lost";
   if (code_ != 0.0) return "the drive shows an error code";
   return tripped_ ? "the drive has tripped" : "";

@@ -91,7 +91,7 @@ class Night final : public Actuator, public Rearm {
 
   Sample write(double command) noexcept override;
   void release() noexcept override { actuator_->release(); }
-  std::string fault_reason() const override;
+  std::string fault_reason(const Trip& trip) const override;
   std::string arm_again() override;
 
  private:

@@ -462,6 +462,8 @@ TEST_F(CanBus, ReleaseOnADeadBusReturns) {
   actuator.release();
   EXPECT_LT(monotonic_ns() - before_ns, 1'000'000'000);
   EXPECT_FALSE(actuator.released());
+  EXPECT_EQ(actuator.not_released(),
+            "neutral has not gone out to the drive, which may still be on: vcan0");
 }
 
 TEST_F(CanBus, ReleaseOutlastsABusOffWithTheUsualRestart) {

@@ -13,6 +13,7 @@
 #include <sys/resource.h>
 
 #include "cli/commands.h"
+#include "cli/configured_rig.h"
 #include "record/sweep_reader.h"
 #include "support/fake_rig.h"
 
@@ -31,6 +32,8 @@ struct Witness {
   std::function<void(const Waiting&)> arming{};
   std::function<void(const Waiting&)> arming_again{};
   std::optional<std::uint64_t> faulty_tick{};
+  std::string not_released{};
+  std::string says{};  // of its faults
 };
 
 // Moves its output on opening, and lets go of it at its end.
@@ -66,6 +69,8 @@ class FakeDevice final : public Device {
     parts.step();
     witness_.parts_when_caught_up = parts.integer(0);
   }
+  std::string not_released() const override { return witness_.not_released; }
+  std::string fault_reason() const override { return witness_.says; }
   Actuator* actuator() noexcept override { return &*actuator_; }
   Sensor& sensor(std::size_t) noexcept override { return *sensor_; }
 
@@ -85,6 +90,7 @@ class FakeDevice final : public Device {
 class BrokenDevice final : public Device {
  public:
   void open(const Clock&) override { throw std::runtime_error("the bus is not there"); }
+  std::string fault_reason() const override { return "edges were lost"; }
   Actuator* actuator() noexcept override { return nullptr; }
   Sensor& sensor(std::size_t) noexcept override { std::abort(); }
 };
@@ -132,11 +138,39 @@ TEST_F(RunCommand, ReleasesTheActuatorWhenAnotherDriverCannotBeOpened) {
   EXPECT_FALSE(fs::exists(folder_ / "run.sweep"));
 }
 
+TEST_F(RunCommand, AsksTheDeviceOfTheChannelThatHasTrippedWhy) {
+  Witness witness;
+  witness.says = "no answer in time";
+  const DriverKit broken{.name = "broken", .summary = "", .configure = [](const DeviceRequest&) {
+                           return std::make_unique<BrokenDevice>();
+                         }};
+  const ConfiguredRig two{rig("[sensor.z]\ndriver = \"broken\"\n"), {fake(witness), broken}};
+  EXPECT_EQ(two.fault_reason({.cause = TripCause::actuator_fault}), "no answer in time");
+  EXPECT_EQ(two.fault_reason({.cause = TripCause::channel_age, .channel = 0}), "no answer in time");
+  EXPECT_EQ(two.fault_reason({.cause = TripCause::channel_age, .channel = 1}), "edges were lost");
+}
+
 // That commit may take a disk a while.
 TEST_F(RunCommand, TellsTheDevicesToCatchUpOnceItsPartIsInTheFile) {
   Witness witness;
   EXPECT_EQ(run_command(options(rig("", 2)), {fake(witness)}), exit_done);
   EXPECT_EQ(witness.parts_when_caught_up, 1);
+}
+
+// All points are measured, and nobody may take the drive for harmless.
+TEST_F(RunCommand, SaysThatTheActuatorHasNotTakenItsRelease) {
+  Witness witness;
+  witness.not_released = "the drive has not taken neutral and may still be on: line: no answer";
+  EXPECT_EQ(run_command(options(rig("", 2)), {fake(witness)}), exit_stopped);
+  const record::StoredRun run = record::read_sweep(folder_ / "run.sweep");
+  EXPECT_EQ(run.fact("outcome"), "stopped");
+  EXPECT_EQ(run.fact("outcome_detail"), witness.not_released);
+  EXPECT_TRUE(std::none_of(run.events.begin(), run.events.end(),
+                           [](const auto& event) { return event.kind == "released"; }));
+  const auto told = std::find_if(run.events.begin(), run.events.end(),
+                                 [](const auto& event) { return event.kind == "not_released"; });
+  ASSERT_NE(told, run.events.end());
+  EXPECT_EQ(told->detail, witness.not_released);
 }
 
 TEST_F(RunCommand, ReleasesTheActuatorWhenTheDiskIsFull) {

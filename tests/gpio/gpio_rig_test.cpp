@@ -155,7 +155,8 @@ TEST(GpioRig, SaysWhatTheLinesHoldWhenTheyCannotBeSet) {
   const Sample sample = actuator.write(0.0);
   EXPECT_EQ(sample.fault, Fault::bus);
   EXPECT_EQ(sample.value, 1.0);
-  EXPECT_THAT(rig.configured->fault_reason(), HasSubstr("the kernel refused to set the lines"));
+  EXPECT_THAT(rig.configured->fault_reason({.cause = TripCause::actuator_fault}),
+              HasSubstr("the kernel refused to set the lines"));
 }
 
 TEST(GpioRig, IsNotArmedWhileTheInterlockIsOpen) {

@@ -21,12 +21,13 @@ constexpr const char* sensor =
     "[sensor.s]\ndriver = \"modbus\"\nconnection = \"drive\"\nregister = 34\n";
 
 // What is said about a rig with these sections; empty when it is accepted.
-std::string refusal(const std::string& sections) {
+std::string refusal(const std::string& sections,
+                    const std::string& limits = "command_min = 0\ncommand_max = 0.5\n") {
   try {
     const config::Rig rig = config::read_rig(
         RigFile::parse("[loop]\nrate_hz = 100\n[sweep]\nstart_hz = 1\nstop_hz = 10\npoints = 3\n"
                        "amplitude = 0.1\n[limits]\n" +
-                           sections,
+                           limits + sections,
                        "rig.toml"));
     modbus_driver().configure({rig, &rig.actuator, {&rig.sensors.front()}});
     rig.file->refuse_unread();
@@ -48,7 +49,7 @@ TEST(ModbusConfig, AcceptsWhatTheShippedRigsSay) {
 
 TEST(ModbusConfig, RefusalsNameFileLineKeyAndRule) {
   EXPECT_THAT(refusal(std::string{actuator} + sensor),
-              HasSubstr("rig.toml:11: [actuator] connection = 'drive': there is no section "
+              HasSubstr("rig.toml:13: [actuator] connection = 'drive': there is no section "
                         "[modbus.drive]"));
   EXPECT_THAT(refusal("[modbus.other]\nhost = \"h\"\n" + std::string{actuator} + sensor),
               HasSubstr("there is no such section [modbus.NAME]; there is \"other\""));
@@ -87,6 +88,40 @@ TEST(ModbusConfig, RefusalsNameFileLineKeyAndRule) {
                                  "[sensor.s]\ndriver = \"modbus\"\nconnection = \"drive\"\n"
                                  "register = 65535\ntype = \"float32\"\n";
   EXPECT_THAT(refusal(at_the_end), HasSubstr("does not end before register 65536"));
+}
+
+// What the guard admits must go out: neither half a sine, nor something else for neutral.
+TEST(ModbusConfig, RefusesLimitsBeyondWhatGoesOut) {
+  const auto limited = [](double low, double high) {
+    return "command_min = " + std::to_string(low) + "\ncommand_max = " + std::to_string(high) +
+           "\n";
+  };
+  EXPECT_THAT(refusal(with(tcp), limited(-0.2, 0.2)),
+              HasSubstr("[actuator] type: the command goes out as 0 to 65535: set [limits] "
+                        "command_min and command_max within"));
+  EXPECT_THAT(refusal(with(tcp, "type = \"int16\"\nscale = 1e-4\n"), limited(-3.2768, 3.28)),
+              HasSubstr("[actuator] type = 'int16': the command goes out as -3.2768 to 3.2767"));
+  EXPECT_EQ(refusal(with(tcp, "type = \"int16\"\nscale = 1e-4\n"), limited(-3.2768, 3.2767)), "");
+  EXPECT_EQ(refusal(with(tcp, "type = \"int16\"\nscale = -1e-4\n"), limited(-3.2767, 3.2768)), "");
+  EXPECT_THAT(refusal(with(tcp, "type = \"int16\"\n"), ""),
+              HasSubstr("set [limits] command_min and command_max within"));
+  EXPECT_EQ(refusal(with(tcp, "type = \"float32\"\n"), ""), "");
+  EXPECT_THAT(refusal(with(tcp, "type = \"float32\"\nclamp_min = 0.1\nclamp_max = 1\n"),
+                      limited(-0.2, 0.2)),
+              HasSubstr("[actuator] clamp_min = 0.1: the command goes out as 0.1 to 1: set"));
+  EXPECT_THAT(refusal(with(tcp, "type = \"float32\"\nclamp_max = 0.1\n"), limited(-0.2, 0.2)),
+              HasSubstr("[actuator] clamp_max = 0.1: the command goes out as -inf to 0.1: set"));
+}
+
+TEST(ModbusConfig, KeepsTheSilenceOfTheStandard) {
+  const auto silence_ns = [](const std::string& keys) {
+    const auto file = RigFile::parse(
+        "[modbus.drive]\ntransport = \"rtu\"\ndevice = \"/dev/x\"\n" + keys, "rig.toml");
+    return read_connection(file->children("modbus").front(), 10.0).link.connection.silence_ns;
+  };
+  EXPECT_EQ(silence_ns("baud = 9600\n"), 4'010'417);
+  EXPECT_EQ(silence_ns("baud = 115200\n"), 1'750'000);
+  EXPECT_EQ(silence_ns("silence_s = 0\n"), 0);
 }
 
 TEST(ModbusConfig, LeavesTimeInThePeriod) {

@@ -14,6 +14,7 @@
 #include <sys/ioctl.h>
 #include <sys/syscall.h>
 
+#include "drivers/modbus/line_rates.h"
 #include "drivers/modbus/transport.h"
 #include "drivers/monotonic_time.h"
 
@@ -105,6 +106,19 @@ TEST_F(Rs485Port, ThatHasNoSuchModeIsRefusedWithWhatToDo) {
                   HasSubstr("[modbus.drive] " + name_ + ": this serial port has no RS-485 mode"),
                   HasSubstr("adapters that switch by themselves need rs485 = \"adapter\""))));
   EXPECT_FALSE(transport.connected());
+}
+
+TEST_F(Rs485Port, RunsAtEveryRateThatARigFileMaySayAndNoOther) {
+  ConnectionSettings wanted = settings(Rs485::adapter);
+  for (const LineRate& rate : line_rates) {
+    wanted.baud = rate.baud;
+    Transport transport{wanted};
+    EXPECT_TRUE(transport.try_connect()) << rate.baud;
+  }
+  wanted.baud = 2'000'000;
+  Transport transport{wanted};
+  EXPECT_THAT([&] { transport.connect(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("does not run at 2000000 baud")));
 }
 
 TEST_F(Rs485Port, ThatHasNoRtsIsRefusedWithWhatToDo) {

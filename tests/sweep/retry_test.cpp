@@ -37,7 +37,7 @@ class TrippingDrive final : public Rearm {
       return tripped ? Fault::device : Fault::none;
     };
   }
-  std::string fault_reason() const override { return "axis_error is 64, must be = 0"; }
+  std::string fault_reason(const Trip&) const override { return "axis_error is 64, must be = 0"; }
   std::string arm_again() override {
     EXPECT_TRUE(bench_.actuator.released);
     armed_at.push_back(bench_.clock.tick());
@@ -51,9 +51,13 @@ class TrippingDrive final : public Rearm {
     return "";
   }
 
+  std::string not_released() const override {
+    return deaf ? "the drive has not taken neutral" : "";
+  }
   void keep_released() noexcept override { released_at.push_back(bench_.clock.tick()); }
 
   bool tripped = false;
+  bool deaf = false;
   std::vector<std::uint64_t> released_at;
   int refusals = 0;
   bool stop_while_arming = false;
@@ -88,6 +92,21 @@ TEST(AFault, IsAnsweredByDisarmingWaitingArmingAndRepeatingThePoint) {
   ASSERT_NE(after, writes.end());
   EXPECT_EQ(after->tick, 582U);
   EXPECT_NEAR(after->command, GuardedBench::neutral, 1e-12);
+}
+
+TEST(AFault, OfADriveThatIsNotReleasedIsNotToldAsIfItWere) {
+  GuardedBench bench;
+  TrippingDrive drive{bench, {80}};
+  drive.deaf = true;
+  drive.refusals = 1;
+  bench.runner_settings.retry = {.faults = 1, .wait_s = 0.5};
+  bench.run(&drive);
+  const std::vector<std::string> kinds = kinds_of(bench);
+  EXPECT_EQ(std::count(kinds.begin(), kinds.end(), "released"), 0);
+  const std::vector<std::string> words = words_of(bench);
+  EXPECT_EQ(std::count(words.begin(), words.end(), "not_released: the drive has not taken neutral"),
+            2)
+      << "after the fault, and at the end";
 }
 
 // A drive that could not be reached when it was to be released still follows its last set-point.
