@@ -131,10 +131,6 @@ void SweepWriter::put_on_disk() {
 bool SweepWriter::lost_its_name() {
   if (displaced_ || !lock_->displaced(path_)) return displaced_;
   displaced_ = true;
-  // SQLite removes the log by its name; that of another run it has to leave alone.
-  if (is_in_use(path_)) {
-    sqlite3_db_config(database_->handle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
-  }
   return true;
 }
 
@@ -142,6 +138,8 @@ void SweepWriter::write_rescued() {
   const std::string lost = std::exchange(path_, free_name(path_ + "-rescued"));
   Statement copy{*database_, "VACUUM INTO ?"};
   copy.bind(path_).run();
+  // The log would be taken for that of whatever stands under the name now, unless it is.
+  if (!is_in_use(lost)) remove_leftovers(lost);
   throw SweepFileError(path_ + ": holds what was measured; " + lost + " " + displaced);
 }
 
