@@ -25,6 +25,7 @@ constexpr double png_scale = 2.0;  // pixels per unit of the picture: sharp on p
 }  // namespace
 
 int report_command(const ReportOptions& options) {
+  refuse_input(options.output, {options.file});
   if (options.format == "html") {
     const std::string path = options.output.empty() ? report_path(options.file) : options.output;
     // First, because a model that has to be fitted goes into the sweep file that is reported.
