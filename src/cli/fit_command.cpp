@@ -289,9 +289,14 @@ void store(const FitCommandOptions& options, const Measured& measured,
   for (std::size_t i = 0; i < measured.inputs.size(); ++i) {
     const FitInput& input = measured.inputs[i];
     if (!input.sweep_file) continue;
-    record::store_fit(options.files[i], input.input, input.output, options.method,
-                      report::fit_json(report));
-    spdlog::info("stored the fit in {}", options.files[i]);
+    try {
+      record::store_fit(options.files[i], input.input, input.output, options.method,
+                        report::fit_json(report));
+      spdlog::info("stored the fit in {}", options.files[i]);
+    } catch (const record::SweepFileError& refused) {
+      // A file that may only be read is fitted all the same, each time anew.
+      spdlog::warn("the fit is not stored: {}", refused.what());
+    }
   }
 }
 
@@ -309,10 +314,16 @@ report::FitReport fit_files(const FitCommandOptions& options) {
   for (std::size_t i = 1; i < measured.inputs.size(); ++i)
     report.label += " and " + measured.inputs[i].label;
 
-  if (options.method == "ml")
-    fit_by_likelihood(options, measured, report);
-  else
-    fit_by_paper(options, measured, report);
+  try {
+    if (options.method == "ml")
+      fit_by_likelihood(options, measured, report);
+    else
+      fit_by_paper(options, measured, report);
+  } catch (const std::invalid_argument& refused) {
+    const std::string what = refused.what();
+    if (!what.starts_with("response: ")) throw;
+    throw std::invalid_argument(options.files.front() + ": " + what);
+  }
   look_at_stability(options, measured, report);
 
   add_discrete(options, measured, report);
