@@ -112,6 +112,10 @@ TEST_F(FitCommand, RefusesWhatIsNoResponse) {
   refuses("1,1,0\n2,0,0\n3,1,0\n", "the response is exactly zero");
   refuses("1,1,0\n2,one,0\n", "response.csv:2: re is \"one\"; wanted a number");
   refuses("1,1\n", "fewer than three columns");
+  refuses("0,5;0,2;-0,1\n1,5;0,2;-0,1\n",
+          "response.csv:1: the numbers have decimal commas; write points");
+  refuses("freq_hz;re;im\n0,5;0,2;-0,1\n", "response.csv:2: the numbers have decimal commas");
+  refuses("1,1,0\n", "response.csv: response: 1 points");
   refuses("", "holds no points; wanted lines of freq_hz,re,im[,std]");
   refuses("freq_hz,re\n1,1\n", "the header has no column im");
 }
