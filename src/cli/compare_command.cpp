@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
@@ -34,6 +35,10 @@ std::string label_of(const std::string& file, const std::vector<std::string>& fi
 
 int compare_command(const CompareOptions& options) {
   refuse_input(options.output, options.files);
+  if (!options.channel.empty() && !options.drift && !has_controller(options.loop))
+    throw std::invalid_argument(
+        "--channel chooses the sensor whose model --drift compares; the points of all are "
+        "compared");
   std::vector<report::LabelledRun> runs;
   for (const std::string& file : options.files)
     runs.push_back({.label = label_of(file, options.files), .run = read_run(file)});

@@ -74,8 +74,9 @@ Measured measure(const FitCommandOptions& options) {
     if (rate_hz > 0.0) measured.hold_period_s = 1.0 / rate_hz;
   } else if (options.hold != "none") {
     const double rate_hz = number_of(options.hold, "--hold", "auto, none or a rate in Hz");
-    if (rate_hz <= 0.0) throw std::invalid_argument("--hold: the rate must be above zero");
-    measured.hold_period_s = 1.0 / rate_hz;
+    if (rate_hz < 0.0)
+      throw std::invalid_argument("--hold: the rate must be above zero, or 0 for no hold");
+    if (rate_hz > 0.0) measured.hold_period_s = 1.0 / rate_hz;
   }
   measured.model_error = options.model_error.value_or(sweep ? sweep_model_errors.back() : 0.0);
   measured.choose_model_error =
@@ -272,7 +273,11 @@ void fit_by_paper(const FitCommandOptions& options, const Measured& measured,
 
 void add_discrete(const FitCommandOptions& options, const Measured& measured,
                   report::FitReport& report) {
-  if (options.discrete.empty()) return;
+  if (options.discrete.empty()) {
+    if (options.rate_hz > 0.0 || options.prewarp_hz > 0.0)
+      throw std::invalid_argument("--rate and --prewarp belong to --discrete");
+    return;
+  }
   const double loop_hz = measured.inputs.front().rate_hz;
   const double rate_hz = options.rate_hz > 0.0 ? options.rate_hz : loop_hz;
   if (!(rate_hz > 0.0))

@@ -321,6 +321,24 @@ TEST_F(CommandLine, CallsABadSweepFileOneWithAMessage) {
   EXPECT_THAT(channel.err, HasSubstr("has no response of \"gyr\"; it has gyro"));
 }
 
+TEST_F(CommandLine, RefusesOptionsWithoutEffect) {
+  ASSERT_EQ(run({"run", "rig.toml", "--no-report"}).code, 0);
+  const auto channel = run({"report", "rig.sweep", "--channel", "gyr"});
+  EXPECT_EQ(channel.code, 1);
+  EXPECT_THAT(channel.err, HasSubstr("has no response of \"gyr\"; it has gyro"));
+  EXPECT_EQ(run({"report", "rig.sweep", "--channel", "gyro"}).code, 0);
+  const auto compared = run({"compare", "rig.sweep", "rig.sweep", "--channel", "gyro"});
+  EXPECT_EQ(compared.code, 2);
+  EXPECT_THAT(compared.err, HasSubstr("--channel chooses the sensor whose model --drift compares"));
+  for (const char* option : {"--rate", "--prewarp"}) {
+    const auto fitted = run({"fit", "rig.sweep", option, "100"});
+    EXPECT_EQ(fitted.code, 2);
+    EXPECT_THAT(fitted.err, HasSubstr("--rate and --prewarp belong to --discrete"));
+  }
+  EXPECT_EQ(run({"fit", "rig.sweep", "--hold", "0", "--no-store", "--json"}).out,
+            run({"fit", "rig.sweep", "--hold", "none", "--no-store", "--json"}).out);
+}
+
 TEST_F(CommandLine, SaysOfEveryFileWhatItIs) {
   std::filesystem::create_directory(path("adir"));
   write("junk.sweep", "no sweep at all, but a line of text\n");

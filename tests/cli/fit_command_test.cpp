@@ -227,7 +227,7 @@ TEST_F(FitCommand, RefusesOptionsThatMakeNoSense) {
   refuses(lag_csv(), "--delay is \"soon\"; wanted none, fit or seconds",
           "--zeros 0 --poles 1 --delay soon");
   refuses(lag_csv(), "--method hassul needs the orders", "--method hassul");
-  refuses(lag_csv(), "--hold", "--zeros 0 --poles 1 --hold 0");
+  refuses(lag_csv(), "--hold: the rate must be above zero", "--zeros 0 --poles 1 --hold=-5");
   const auto absent = workshop_.sinerig("fit nowhere.csv");
   EXPECT_EQ(absent.exit_code, 2);
   EXPECT_THAT(absent.errors, HasSubstr("nowhere.csv: cannot be read"));
