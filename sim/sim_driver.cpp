@@ -249,6 +249,18 @@ class SimDevice final : public Device {
   std::optional<FaultyDrive> drive_;
 };
 
+// The plant is integrated in pieces shorter than its fastest state: beyond this many in a tick one
+// takes seconds, and no signal ends it.
+void refuse_stiff(const Section& plant, const LinearSystem& system, double period_s) {
+  constexpr double most_pieces = 1e6;
+  if (system.states() == 0) return;
+  const double pieces = 2.0 * period_s * system.a.cwiseAbs().rowwise().sum().maxCoeff();
+  if (pieces <= most_pieces) return;
+  plant.refuse("kind",
+               "its fastest state is too fast to be simulated at the rate of the loop; look "
+               "for an inertia, a time constant or a denominator next to nothing");
+}
+
 std::unique_ptr<Device> configure(const DeviceRequest& request) {
   if (request.actuator == nullptr) {
     request.sensors.front()->section.refuse(
@@ -258,6 +270,7 @@ std::unique_ptr<Device> configure(const DeviceRequest& request) {
   SimulatedRigSettings settings;
   settings.system = read_plant(plant);
   settings.friction = read_friction(plant, settings.system);
+  refuse_stiff(plant, settings.system, 1.0 / request.rig.rate_hz);
   settings.seed = static_cast<std::uint64_t>(
       plant.integer("seed", {.min = 0.0, .max = 9e15}, static_cast<std::int64_t>(settings.seed)));
   read_controller(plant, settings);

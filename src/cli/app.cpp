@@ -20,6 +20,7 @@
 #include "cli/margins_command.h"
 #include "cli/notch_command.h"
 #include "cli/run_arguments.h"
+#include "config/misspelt.h"
 #include "config/section.h"
 #include "record/file_lock.h"
 #include "version.h"
@@ -133,6 +134,28 @@ int checked_output(int exit_code) {
   return exit_code == exit_done ? static_cast<int>(exit_failed) : exit_code;
 }
 
+// What stands where a command is wanted; empty where nothing does.
+std::string first_word(int argc, char** argv) {
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (word == "--log-level") {
+      ++i;
+    } else if (!word.starts_with('-')) {
+      return word;
+    }
+  }
+  return {};
+}
+
+// Of a command with a slip of the finger in it.
+std::string meant(const CLI::App& app, const std::string& word) {
+  for (const CLI::App* command : app.get_subcommands({})) {
+    if (config::is_misspelt(word, command->get_name()))
+      return "; did you mean " + command->get_name() + "?";
+  }
+  return {};
+}
+
 int run_command_line(int argc, char** argv, const std::vector<DriverKit>& drivers) {
   CLI::App app{description, "sinerig"};
   app.footer(footer);
@@ -182,6 +205,20 @@ int run_command_line(int argc, char** argv, const std::vector<DriverKit>& driver
 
   try {
     app.parse(arguments_of(argc, argv));
+  } catch (const CLI::RequiredError& error) {
+    const std::string word = first_word(argc, argv);
+    if (app.get_subcommands().empty() && word == "help") {
+      std::cout << app.help();
+      return exit_done;
+    }
+    set_up_logging({});
+    if (!app.get_subcommands().empty() || word.empty()) {
+      app.exit(error);
+    } else {
+      spdlog::error("there is no command \"{}\"{}; sinerig --help lists them", word,
+                    meant(app, word));
+    }
+    return exit_usage;
   } catch (const CLI::ParseError& error) {
     const int exit_code = app.exit(error) == 0 ? exit_done : exit_usage;
     set_up_logging({});

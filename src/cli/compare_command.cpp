@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <stdexcept>
 
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
@@ -33,10 +34,17 @@ std::string label_of(const std::string& file, const std::vector<std::string>& fi
 }  // namespace
 
 int compare_command(const CompareOptions& options) {
+  refuse_input(options.output, options.files);
+  if (!options.channel.empty() && !options.drift && !has_controller(options.loop))
+    throw std::invalid_argument(
+        "--channel chooses the sensor whose model --drift compares; the points of all are "
+        "compared");
   std::vector<report::LabelledRun> runs;
   for (const std::string& file : options.files)
     runs.push_back({.label = label_of(file, options.files), .run = read_run(file)});
-  const std::vector<Difference> differences = differences_of(runs, options.settings);
+  std::vector<report::LabelledRun> as_planned;
+  for (const report::LabelledRun& run : runs) as_planned.push_back(with_unmeasured(run));
+  const std::vector<Difference> differences = differences_of(as_planned, options.settings);
 
   bool changed = false;
   for (const Difference& difference : differences) changed = changed || difference.changed();

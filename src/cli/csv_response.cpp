@@ -58,6 +58,8 @@ class Reader {
   CsvResponse read() {
     std::string line;
     while (lines_.next(line)) {
+      if (record::has_decimal_commas(line))
+        lines_.refuse("the numbers have decimal commas; write points, 0.5 instead of 0,5");
       fields_ = fields_of(line);
       if (columns_.empty() && !is_number(fields_.front())) {
         name_columns();

@@ -93,6 +93,7 @@ void export_mat(const StoredRun& run, const ExportOptions& options) {
 }  // namespace
 
 int export_command(const ExportOptions& options) {
+  refuse_input(options.output, {options.file});
   const StoredRun run = read_run(options.file);
   if (options.format == "mat") {
     export_mat(run, options);

@@ -74,8 +74,9 @@ Measured measure(const FitCommandOptions& options) {
     if (rate_hz > 0.0) measured.hold_period_s = 1.0 / rate_hz;
   } else if (options.hold != "none") {
     const double rate_hz = number_of(options.hold, "--hold", "auto, none or a rate in Hz");
-    if (rate_hz <= 0.0) throw std::invalid_argument("--hold: the rate must be above zero");
-    measured.hold_period_s = 1.0 / rate_hz;
+    if (rate_hz < 0.0)
+      throw std::invalid_argument("--hold: the rate must be above zero, or 0 for no hold");
+    if (rate_hz > 0.0) measured.hold_period_s = 1.0 / rate_hz;
   }
   measured.model_error = options.model_error.value_or(sweep ? sweep_model_errors.back() : 0.0);
   measured.choose_model_error =
@@ -272,7 +273,11 @@ void fit_by_paper(const FitCommandOptions& options, const Measured& measured,
 
 void add_discrete(const FitCommandOptions& options, const Measured& measured,
                   report::FitReport& report) {
-  if (options.discrete.empty()) return;
+  if (options.discrete.empty()) {
+    if (options.rate_hz > 0.0 || options.prewarp_hz > 0.0)
+      throw std::invalid_argument("--rate and --prewarp belong to --discrete");
+    return;
+  }
   const double loop_hz = measured.inputs.front().rate_hz;
   const double rate_hz = options.rate_hz > 0.0 ? options.rate_hz : loop_hz;
   if (!(rate_hz > 0.0))
@@ -289,9 +294,14 @@ void store(const FitCommandOptions& options, const Measured& measured,
   for (std::size_t i = 0; i < measured.inputs.size(); ++i) {
     const FitInput& input = measured.inputs[i];
     if (!input.sweep_file) continue;
-    record::store_fit(options.files[i], input.input, input.output, options.method,
-                      report::fit_json(report));
-    spdlog::info("stored the fit in {}", options.files[i]);
+    try {
+      record::store_fit(options.files[i], input.input, input.output, options.method,
+                        report::fit_json(report));
+      spdlog::info("stored the fit in {}", options.files[i]);
+    } catch (const record::SweepFileError& refused) {
+      // A file that may only be read is fitted all the same, each time anew.
+      spdlog::warn("the fit is not stored: {}", refused.what());
+    }
   }
 }
 
@@ -309,10 +319,16 @@ report::FitReport fit_files(const FitCommandOptions& options) {
   for (std::size_t i = 1; i < measured.inputs.size(); ++i)
     report.label += " and " + measured.inputs[i].label;
 
-  if (options.method == "ml")
-    fit_by_likelihood(options, measured, report);
-  else
-    fit_by_paper(options, measured, report);
+  try {
+    if (options.method == "ml")
+      fit_by_likelihood(options, measured, report);
+    else
+      fit_by_paper(options, measured, report);
+  } catch (const std::invalid_argument& refused) {
+    const std::string what = refused.what();
+    if (!what.starts_with("response: ")) throw;
+    throw std::invalid_argument(options.files.front() + ": " + what);
+  }
   look_at_stability(options, measured, report);
 
   add_discrete(options, measured, report);

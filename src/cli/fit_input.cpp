@@ -20,12 +20,20 @@ namespace {
 
 constexpr double turn = 2.0 * std::numbers::pi;
 
+std::string lower_case(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char each) { return static_cast<char>(std::tolower(each)); });
+  return text;
+}
+
+// By its name, too: what is damaged is not taken for a table.
 bool is_sweep_file(const std::string& path) {
+  refuse_folder(path);
   std::ifstream file{path, std::ios::binary};
   if (!file) throw InputError(path + ": cannot be read; check the name");
   std::string magic(15, '\0');
   file.read(magic.data(), static_cast<std::streamsize>(magic.size()));
-  return magic == "SQLite format 3";
+  return magic == "SQLite format 3" || lower_case(path).ends_with(".sweep");
 }
 
 // Between the sub-bands of a sweep by sub-bands that do not overlap; empty where it is none.
@@ -76,12 +84,6 @@ FitInput from_run(const record::StoredRun& run, const std::string& path,
                                   [](double dof) { return std::isfinite(dof); });
   if (pooled) input.response = identify::pooled_scatter(input.response, degrees_of_freedom);
   return input;
-}
-
-std::string lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char each) { return static_cast<char>(std::tolower(each)); });
-  return text;
 }
 
 }  // namespace

@@ -21,9 +21,10 @@ CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
   fit->add_option("--delay", options.delay,
                   "none, fit (default of ml), or a known delay in seconds (hassul, choe: default "
                   "none)");
-  fit->add_option("--hold", options.hold,
-                  "zero-order hold that drove the plant: auto (the loop of a sweep file), none, or "
-                  "its rate in Hz")
+  fit->add_option(
+         "--hold", options.hold,
+         "zero-order hold that drove the plant: auto (the loop of a sweep file), none or 0, or "
+         "its rate in Hz")
       ->capture_default_str();
   fit->add_option("--path-delay", options.path_delay_s,
                   "delay of the measuring path in seconds, not part of the model");

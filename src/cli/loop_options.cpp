@@ -88,6 +88,10 @@ double loop_rate_hz(const LoopOptions& options, const FitInput& measured) {
   const double rate_hz = options.rate_hz.value_or(has_controller(options) ? measured.rate_hz : 0.0);
   if (!(rate_hz >= 0.0) || !std::isfinite(rate_hz))
     throw std::invalid_argument("--rate: wanted a rate in Hz, or 0 for a continuous controller");
+  if (rate_hz > 0.0 && options.pid.size() == 3 && options.pid[2] != 0.0)
+    throw std::invalid_argument(
+        "--pid: a controller that runs at a rate has to filter its derivative; give FILTER_HZ as "
+        "the fourth number, or --rate 0 for a continuous one");
   return rate_hz;
 }
 

@@ -1,6 +1,7 @@
 #include "cli/measured_run.h"
 
 #include <algorithm>
+#include <filesystem>
 
 #include <spdlog/spdlog.h>
 
@@ -8,7 +9,14 @@
 
 namespace sinerig::cli {
 
+void refuse_folder(const std::string& path) {
+  std::error_code unknown;
+  if (std::filesystem::is_directory(path, unknown))
+    throw record::SweepFileError(path + ": is a folder; wanted a file");
+}
+
 record::StoredRun read_run(const std::string& path) {
+  refuse_folder(path);
   record::StoredRun run = record::read_measured(path);
   const std::string left_out = run.fact(record::left_out_fact);
   if (!left_out.empty())

@@ -7,6 +7,9 @@
 
 namespace sinerig::cli {
 
+// Throws record::SweepFileError: what it is told of a folder misleads.
+void refuse_folder(const std::string& path);
+
 // record::read_measured; warns of points that were left out. Throws as it does.
 record::StoredRun read_run(const std::string& path);
 

@@ -30,8 +30,10 @@ constexpr std::chrono::minutes most_reading{10};
 
 std::unique_ptr<ConfiguredRig> configured_rig(const NightTask& task,
                                               const std::vector<DriverKit>& drivers) {
-  return std::make_unique<ConfiguredRig>(config::RigFile::parse(task.rig_text, task.sweep->rig),
-                                         drivers);
+  return of_sweep(*task.sweep, [&] {
+    return std::make_unique<ConfiguredRig>(config::RigFile::parse(task.rig_text, task.sweep->rig),
+                                           drivers);
+  });
 }
 
 // What is there may be a run that was killed as it began: that is in the way.
@@ -55,7 +57,8 @@ class Night {
         tasks_{tasks_of(job_)} {
     // Whatever can be refused is, before the first of them moves anything.
     for (const NightTask& task : tasks_) {
-      configured_rig(task, drivers_)->rig().plan();
+      const std::unique_ptr<ConfiguredRig> configured = configured_rig(task, drivers_);
+      of_sweep(*task.sweep, [&] { return configured->rig().plan(); });
       state_of(task);
     }
   }

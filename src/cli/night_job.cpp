@@ -58,7 +58,44 @@ NightSweep read_sweep(const Section& section, const std::string& file) {
   return sweep;
 }
 
+// `number` from 0.
+void note_places(NightSweep& sweep, std::size_t number, const config::RigFile& file) {
+  const std::string path = "night.sweep[" + std::to_string(number) + "].";
+  const auto line = [&](const std::string& key) {
+    return config::line_of(file.text(), file.name(), path + key);
+  };
+  sweep.job = file.name();
+  sweep.rig_line = line("rig");
+  for (const auto& [key, value] : sweep.overrides)
+    sweep.override_lines.push_back(line("set." + key));
+}
+
+std::string place_in_job(const NightSweep& sweep, std::size_t line) {
+  return sweep.job + ":" + std::to_string(line) + ": ";
+}
+
+bool speaks_of(const std::string& message, const std::string& path) {
+  const std::size_t dot = path.rfind('.');
+  if (dot == std::string::npos) return false;
+  const std::string section = std::string{"["}.append(path, 0, dot).append("]");
+  const std::string key = section + " " + path.substr(dot + 1);
+  for (const std::string& words : {key + " = ", key + ": ", section + ": unknown section"}) {
+    if (message.find(": " + words) != std::string::npos) return true;
+  }
+  return false;
+}
+
 }  // namespace
+
+std::string at_its_place(const NightSweep& sweep, const std::string& message) {
+  for (std::size_t i = 0; i < sweep.overrides.size(); ++i) {
+    if (!speaks_of(message, sweep.overrides[i].first)) continue;
+    return place_in_job(sweep, sweep.override_lines[i]) + message.substr(message.find(": [") + 2) +
+           " (set for " + sweep.rig + ")";
+  }
+  if (sweep.overrides.empty()) return message;
+  return message + " (counted with the lines that " + sweep.job + " adds)";
+}
 
 NightJob read_night_job(const std::string& path) {
   const std::unique_ptr<config::RigFile> file = config::RigFile::load(path);
@@ -74,6 +111,7 @@ NightJob read_night_job(const std::string& path) {
   std::set<std::string> names;
   for (const Section& section : night.tables("sweep")) {
     job.sweeps.push_back(read_sweep(section, path));
+    note_places(job.sweeps.back(), job.sweeps.size() - 1, *file);
     if (names.insert(job.sweeps.back().name).second) continue;
     section.refuse(section.has("name") ? "name" : "rig",
                    "\"" + job.sweeps.back().name +
@@ -87,8 +125,15 @@ NightJob read_night_job(const std::string& path) {
 std::vector<NightTask> tasks_of(const NightJob& job) {
   std::vector<NightTask> tasks;
   for (const NightSweep& sweep : job.sweeps) {
-    const std::unique_ptr<config::RigFile> rig = config::RigFile::load(sweep.rig);
-    const std::string text = config::with_overrides(rig->text(), sweep.rig, sweep.overrides);
+    if (!fs::exists(sweep.rig)) {
+      throw config::ConfigError(place_in_job(sweep, sweep.rig_line) + "[night.sweep] rig: " +
+                                sweep.rig + ": cannot be read; is the path right?");
+    }
+    std::string text = config::RigFile::load(sweep.rig)->text();
+    for (std::size_t i = 0; i < sweep.overrides.size(); ++i) {
+      const std::string place = sweep.job + ":" + std::to_string(sweep.override_lines[i]);
+      text = config::with_overrides(text, place, {sweep.overrides[i]});
+    }
     const std::unique_ptr<config::RigFile> edited = config::RigFile::parse(text, sweep.rig);
     const std::optional<Section> plant = edited->find("plant");
     for (int repeat = 1; repeat <= sweep.repeat; ++repeat) {
@@ -99,7 +144,8 @@ std::vector<NightTask> tasks_of(const NightJob& job) {
                                        .string(),
                      .rig_text = text};
       if (plant && repeat > 1) {
-        const std::int64_t seed = plant->integer("seed", {.min = 0.0, .max = 9e15}, 1);
+        const std::int64_t seed =
+            of_sweep(sweep, [&] { return plant->integer("seed", {.min = 0.0, .max = 9e15}, 1); });
         task.rig_text = config::with_overrides(text, sweep.rig,
                                                {{"plant.seed", std::to_string(seed + repeat - 1)}});
       }

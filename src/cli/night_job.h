@@ -2,6 +2,7 @@
 // replaced, repeated, at a time of its own.
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <string>
@@ -21,7 +22,24 @@ struct NightSweep {
   std::optional<int> second_of_day;     // start_at: the first not before this local time
   std::optional<double> start_after_s;  // … nor before this, from the beginning of the night
   std::vector<config::Override> overrides;
+  std::string job{};                          // the job file …
+  std::size_t rig_line = 0;                   // … its line of the rig
+  std::vector<std::size_t> override_lines{};  // … and of each override
 };
+
+// What is wrong with the rig of a sweep, by the place in the job file where that has set it: the
+// lines of a rig file with other values in it are those of no file.
+std::string at_its_place(const NightSweep& sweep, const std::string& message);
+
+// Calls `make`; a ConfigError gets the message of at_its_place().
+template <typename Make>
+auto of_sweep(const NightSweep& sweep, Make make) {
+  try {
+    return make();
+  } catch (const config::ConfigError& error) {
+    throw config::ConfigError(at_its_place(sweep, error.what()));
+  }
+}
 
 struct NightJob {
   std::string file;

@@ -71,6 +71,12 @@ identify::UncertainMode interval_of(const NotchOptions& options,
   for (std::size_t i = 0; i < plants.size(); ++i)
     modes.push_back(mode_near(plants[i], options.files[i], frequency_hz));
   identify::UncertainMode mode = identify::uncertain_mode(modes);
+  if (options.within_hz >= mode.low_hz) {
+    std::ostringstream message;
+    message << "--within " << options.within_hz << ": must be below the resonance at "
+            << mode.frequency_hz << " Hz";
+    throw std::invalid_argument(message.str());
+  }
   mode.low_hz -= options.within_hz;
   mode.high_hz += options.within_hz;
   mode.frequency_hz = std::sqrt(std::max(mode.low_hz, 0.0) * mode.high_hz);

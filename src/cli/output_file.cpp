@@ -5,7 +5,7 @@
 #include <sstream>
 #include <unistd.h>
 
-#include "record/database.h"
+#include "record/sweep_path.h"
 
 namespace sinerig::cli {
 
@@ -39,8 +39,22 @@ bool put_in_place(const fs::path& target, const std::string& text) {
 
 }  // namespace
 
+void refuse_input(const std::string& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs) {
+    std::error_code error;
+    if (output.empty() || !fs::equivalent(output, input, error) || error) continue;
+    throw record::FileExists(output + ": is what is read; choose another name with -o");
+  }
+}
+
 void refuse_existing(const std::string& path, bool force) {
-  if (force || !fs::exists(path)) return;
+  if (!fs::exists(path)) return;
+  if (record::is_database(path)) {
+    throw record::FileExists(path +
+                             ": is a sweep file, which only `sinerig run --force` replaces; " +
+                             "choose another name with -o");
+  }
+  if (force) return;
   throw record::FileExists(
       path + ": exists already; choose another name with -o, or --force to replace it");
 }

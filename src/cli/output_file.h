@@ -4,6 +4,7 @@
 #include <functional>
 #include <iosfwd>
 #include <string>
+#include <vector>
 
 namespace sinerig::cli {
 
@@ -13,7 +14,12 @@ namespace sinerig::cli {
 void write_file(const std::string& path, bool force,
                 const std::function<void(std::ostream&)>& write);
 
-// Throws record::FileExists as above, for writers that open the file themselves.
+// Throws record::FileExists where `output` is one of the files that it is made from, under whatever
+// name. Nothing is written over a measurement.
+void refuse_input(const std::string& output, const std::vector<std::string>& inputs);
+
+// Throws record::FileExists as above, and for a sweep file in any case, for writers that open the
+// file themselves.
 void refuse_existing(const std::string& path, bool force);
 
 }  // namespace sinerig::cli

@@ -235,6 +235,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
     if (const std::string unsaid = put_down_end(*writer, end); !unsaid.empty()) {
       end.outcome = "stopped";
       end.reason += (end.reason.empty() ? "" : "; not in the file, ") + unsaid;
+      end.sweep_file = writer->path();  // another, where its name was taken away
     }
     if (options.report) end.report_file = report_beside(writer->path());
   });

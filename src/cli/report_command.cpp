@@ -25,8 +25,12 @@ constexpr double png_scale = 2.0;  // pixels per unit of the picture: sharp on p
 }  // namespace
 
 int report_command(const ReportOptions& options) {
+  refuse_input(options.output, {options.file});
   if (options.format == "html") {
     const std::string path = options.output.empty() ? report_path(options.file) : options.output;
+    // The page shows every sensor, but a name that is none is a slip.
+    if (!options.channel.empty())
+      chosen_response(read_run(options.file), options.file, options.channel);
     // First, because a model that has to be fitted goes into the sweep file that is reported.
     const nlohmann::ordered_json loop =
         has_controller(options.loop) ? loop_panel(options.file, options.channel, options.loop)

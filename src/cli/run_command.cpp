@@ -1,5 +1,7 @@
+#include <cctype>
 #include <charconv>
 #include <filesystem>
+#include <stdexcept>
 
 #include <spdlog/spdlog.h>
 
@@ -71,9 +73,22 @@ bool goes_on(const std::string& sweep_file, const config::Rig& rig, const SweepP
   }
 }
 
+// By these every other command takes a file for something else than a sweep.
+void refuse_other_format(const std::string& output) {
+  std::string extension = fs::path{output}.extension().string();
+  for (char& each : extension)
+    each = static_cast<char>(std::tolower(static_cast<unsigned char>(each)));
+  for (const char* other : {".csv", ".txt", ".mat", ".uff", ".unv", ".html", ".json", ".toml"}) {
+    if (extension != other) continue;
+    throw std::invalid_argument(output + ": a run leaves a sweep file; call it NAME.sweep, and " +
+                                "`sinerig export` makes other formats of it");
+  }
+}
+
 }  // namespace
 
 int run_command(const RunOptions& options, const std::vector<DriverKit>& drivers) {
+  refuse_other_format(options.output);
   ConfiguredRig configured{config::RigFile::load(options.rig), drivers};
   const SweepPlan plan = configured.rig().plan();
   if (options.resume) {

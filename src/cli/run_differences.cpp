@@ -1,6 +1,12 @@
 #include "cli/run_differences.h"
 
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
 #include <spdlog/spdlog.h>
+
+#include "record/measured.h"
 
 namespace sinerig::cli {
 
@@ -15,7 +21,41 @@ const StoredResponse* same_response(const report::LabelledRun& run, const std::s
   return nullptr;
 }
 
+bool has_point_at(const StoredResponse& response, double frequency_hz) {
+  constexpr double same = 1e-6;  // part of a frequency, as compare_responses() matches them
+  return std::any_of(response.points.begin(), response.points.end(), [&](const auto& point) {
+    return std::abs(point.frequency_hz - frequency_hz) <= same * frequency_hz;
+  });
+}
+
 }  // namespace
+
+report::LabelledRun with_unmeasured(report::LabelledRun run) {
+  const std::string outcome = run.run.fact("outcome");
+  if (run.run.plan.dwells.empty() || outcome == "done") return run;
+  std::size_t most = 0;
+  for (StoredResponse& response : run.run.responses) {
+    const std::size_t measured = response.points.size();
+    for (const Dwell& dwell : run.run.plan.dwells) {
+      for (const Tone& tone : dwell.tones) {
+        const double frequency_hz = dwell.tone_hz(tone, run.run.plan.rate_hz);
+        if (has_point_at(response, frequency_hz)) continue;
+        record::StoredPoint point = record::imported_point();
+        point.frequency_hz = frequency_hz;
+        point.status = "stopped";
+        response.points.push_back(point);
+      }
+    }
+    most = std::max(most, response.points.size() - measured);
+    std::stable_sort(response.points.begin(), response.points.end(),
+                     [](const auto& a, const auto& b) { return a.frequency_hz < b.frequency_hz; });
+  }
+  spdlog::warn(
+      "{}: its run is not done ({}): {} planned points were not measured and are counted as not "
+      "good",
+      run.label, outcome.empty() ? "killed, or still going on" : outcome, most);
+  return run;
+}
 
 std::vector<Difference> differences_of(const std::vector<report::LabelledRun>& runs,
                                        const record::CompareSettings& settings) {

@@ -82,6 +82,12 @@ std::string with_override(const std::string& text, const std::string& name, cons
 
 }  // namespace
 
+std::size_t line_of(const std::string& text, const std::string& name, const std::string& path) {
+  const toml::table root = parsed(text, name);
+  const auto value = root.at_path(path);
+  return value ? value.node()->source().begin.line : 0;
+}
+
 std::string with_overrides(std::string text, const std::string& name,
                            const std::vector<Override>& overrides) {
   for (const auto& [path, value] : overrides) text = with_override(text, name, path, value);

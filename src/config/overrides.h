@@ -2,6 +2,7 @@
 // whole rig file again.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,5 +17,8 @@ using Override = std::pair<std::string, std::string>;
 // `name` and the path.
 std::string with_overrides(std::string text, const std::string& name,
                            const std::vector<Override>& overrides);
+
+// The line of a value in `text`, from 1; 0 where there is none: {"night.sweep[0].rig"}.
+std::size_t line_of(const std::string& text, const std::string& name, const std::string& path);
 
 }  // namespace sinerig::config

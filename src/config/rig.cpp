@@ -119,6 +119,10 @@ std::vector<std::string> Rig::sensor_names() const {
 }
 
 Rig read_rig(std::unique_ptr<RigFile> file) {
+  if (!file->find("loop") && file->find("night")) {
+    throw ConfigError(file->name() + ": is a job file, no rig file; `sinerig night " +
+                      file->name() + "` runs it");
+  }
   const Section loop = file->section("loop");
   const Section sweep = file->section("sweep");
   const Section limits = file->section("limits");

@@ -3,6 +3,7 @@
 #include <iterator>
 #include <utility>
 
+#include "config/misspelt.h"
 #include "config/toml_nodes.h"
 
 namespace sinerig::config {
@@ -92,8 +93,13 @@ std::optional<Section> RigFile::find(std::string_view name) {
 
 Section RigFile::section(std::string_view name) {
   std::optional<Section> section = find(name);
-  if (!section) throw ConfigError(name_ + ": the section [" + std::string{name} + "] is missing");
-  return *section;
+  if (section) return *section;
+  for (const auto& [key, node] : document_->root) {
+    if (read_.contains(std::string{key.str()}) || !is_misspelt(key.str(), name)) continue;
+    throw ConfigError(place(name_, key.source()) + "[" + std::string{key.str()} +
+                      "]: unknown section" + suggestion(std::string{name}));
+  }
+  throw ConfigError(name_ + ": the section [" + std::string{name} + "] is missing");
 }
 
 std::vector<Section> RigFile::children(std::string_view parent) {

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "config/misspelt.h"
 #include "config/toml_nodes.h"
 
 namespace sinerig::config {
@@ -67,6 +68,7 @@ std::string Range::rule() const {
 struct Section::Access {
   static const toml::node& require(const Section& section, std::string_view key,
                                    std::string_view rule);
+  static void refuse_misspelt(const Section& section, std::string_view key);
   static const toml::array& require_array(const Section& section, std::string_view key,
                                           std::string_view rule);
   static std::vector<double> numbers(const Section& section, std::string_view key,
@@ -79,9 +81,23 @@ Section::Section(std::string name, std::string pattern, std::shared_ptr<const No
   file_->read_.insert(name_);
 }
 
+// What is missing may be there under a name that nobody will ask for.
+void Section::Access::refuse_misspelt(const Section& section, std::string_view key) {
+  for (const auto& [other, node] : *section.node_->table) {
+    const std::string word{other.str()};
+    if (section.file_->read_.contains(section.name_ + "." + word) || !is_misspelt(word, key))
+      continue;
+    throw ConfigError(place(section.file_->name_, other.source()) + "[" + section.name_ + "] " +
+                      word + ": unknown key; did you mean " + std::string{key} + "?");
+  }
+}
+
 const toml::node& Section::Access::require(const Section& section, std::string_view key,
                                            std::string_view rule) {
-  if (!section.has(key)) section.refuse(key, "is missing; it " + std::string{rule});
+  if (!section.has(key)) {
+    refuse_misspelt(section, key);
+    section.refuse(key, "is missing; it " + std::string{rule});
+  }
   section.file_->read_.insert(section.name_ + "." + std::string{key});
   return *section.node_->table->get(key);
 }

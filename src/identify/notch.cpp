@@ -73,6 +73,23 @@ Notch narrowest(const UncertainMode& mode, const NotchRequest& request, double r
   return of_width(high);
 }
 
+// As far as a notch that is still one goes; the damping of the resonance limits that, and the width
+// of the interval it may lie in.
+[[noreturn]] void refuse_too_wide(const UncertainMode& mode, const NotchRequest& request) {
+  double most_db = 0.0;
+  for (double ratio = 0.99; ratio > 1e-4; ratio *= 0.9) {
+    const Notch notch{mode.frequency_hz, ratio * widest, widest, request.rate_hz};
+    most_db = std::max(most_db, worst_attenuation_db(notch, mode));
+  }
+  std::ostringstream what;
+  what.precision(3);
+  what << request.attenuation_db << " dB wants a notch with poles damped by more than " << widest
+       << ", two lags far apart: a resonance damped by up to " << mode.damping_high << ", between "
+       << mode.low_hz << " and " << mode.high_hz << " Hz, allows "
+       << std::floor(10.0 * most_db) / 10.0 << " dB at most; ask for less, or measure it better";
+  refuse(mode.frequency_hz, what.str());
+}
+
 }  // namespace
 
 UncertainMode uncertain_mode(const std::vector<Mode>& of_each_fit) {
@@ -170,10 +187,7 @@ NotchDesign design_notch(const UncertainMode& mode, const NotchRequest& request)
     const Notch& better = left_better ? at_left : at_right;
     if (cost(better) < cost(best)) best = better;
   }
-  if (best.pole_damping > widest)
-    refuse(mode.frequency_hz,
-           "the interval of the resonance is too wide for this attenuation; "
-           "ask for less, or measure it better");
+  if (best.pole_damping > widest) refuse_too_wide(mode, request);
   return {best, worst_attenuation_db(best, mode), cost(best)};
 }
 

@@ -1,6 +1,8 @@
 #include "record/csv_text.h"
 
+#include <algorithm>
 #include <cstdlib>
+#include <sstream>
 
 namespace sinerig::record {
 
@@ -41,6 +43,17 @@ std::string as_field(std::string text) {
     if (static_cast<unsigned char>(each) < 0x20) each = ' ';
   }
   return text;
+}
+
+bool has_decimal_commas(const std::string& line) {
+  if (line.find(';') == std::string::npos || line.find(',') == std::string::npos) return false;
+  std::istringstream fields{line};
+  for (std::string field; std::getline(fields, field, ';');) {
+    std::replace(field.begin(), field.end(), ',', '.');
+    field = trimmed_field(field);
+    if (!field.empty() && !is_number(field)) return false;
+  }
+  return true;
 }
 
 }  // namespace sinerig::record

@@ -21,4 +21,8 @@ void drop_byte_order_mark(std::string& first_line);
 // Text that a field can hold without ending it: commas, quotes and line ends replaced.
 std::string as_field(std::string text);
 
+// Whether these are numbers with decimal commas between semicolons: "0,5;0,2;-0,1". Taken for
+// commas between fields they would be others.
+bool has_decimal_commas(const std::string& line);
+
 }  // namespace sinerig::record

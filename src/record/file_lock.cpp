@@ -50,6 +50,12 @@ FileLock::FileLock(const std::string& path, const std::string& who)
   throw SweepFileError(path + ": cannot be locked: " + std::strerror(error));
 }
 
+bool FileLock::displaced(const std::string& path) const noexcept {
+  struct stat named {};
+  if (stat(path.c_str(), &named) != 0) return errno == ENOENT || errno == ENOTDIR;
+  return !stands_under(path, descriptor_);
+}
+
 FileLock::~FileLock() {
   close(descriptor_);
 }

@@ -33,6 +33,10 @@ class FileLock {
   // there is such a file, or somebody was faster. Throws SweepFileError where none can be made.
   static std::unique_ptr<FileLock> claim(const std::string& path);
 
+  // Whether the locked file is known to stand under this name no more: removed, renamed, or another
+  // one in its place. A name that just cannot be looked up says nothing.
+  bool displaced(const std::string& path) const noexcept;
+
   FileLock(const FileLock&) = delete;
   FileLock& operator=(const FileLock&) = delete;
 

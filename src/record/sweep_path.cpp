@@ -1,6 +1,8 @@
 #include "record/sweep_path.h"
 
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 
 #include "record/file_lock.h"
 #include "record/unfinished_run.h"
@@ -8,6 +10,8 @@
 namespace sinerig::record {
 
 namespace {
+
+namespace fs = std::filesystem;
 
 void refuse_in_use(const std::string& path) {
   try {
@@ -84,11 +88,27 @@ void make_way(const std::string& path, bool replace) {
     throw FileExists(path + ": exists already" + resumable +
                      "; choose another name with -o, or --force to replace it");
   }
+  if (!fs::is_regular_file(path) || (fs::file_size(path) > 0 && !is_database(path))) {
+    throw FileExists(path + ": is not a sweep file, and nothing else is replaced; choose another " +
+                     "name with -o");
+  }
   const FileLock nobody_writes{path, file_in_use};
   set_aside(path);
 }
 
 }  // namespace
+
+bool is_database(const std::string& path) noexcept {
+  try {
+    if (!fs::is_regular_file(path)) return false;
+    std::ifstream stream{path, std::ios::binary};
+    char magic[15] = {};
+    stream.read(magic, sizeof magic);
+    return stream && std::string_view{magic, sizeof magic} == "SQLite format 3";
+  } catch (const std::exception&) {
+    return false;
+  }
+}
 
 void remove_leftovers(const std::string& path) noexcept {
   std::error_code not_there;

@@ -31,6 +31,30 @@ std::string exact(double value) {
   return text;
 }
 
+constexpr const char* displaced =
+    "was removed, renamed or replaced by another file while it was being written";
+
+bool is_in_use(const std::string& path) {
+  try {
+    const FileLock nobody_writes{path, file_in_use};
+  } catch (const FileInUse&) {
+    return true;
+  } catch (const SweepFileError&) {
+    // There is none, or it is not ours to write.
+  }
+  return false;
+}
+
+// Of a file that is not there yet: the name, or the first with a number behind it.
+std::string free_name(const std::string& wanted) {
+  std::string name = wanted;
+  std::error_code error;
+  for (int number = 2; std::filesystem::exists(name, error); ++number) {
+    name = wanted + "-" + std::to_string(number);
+  }
+  return name;
+}
+
 }  // namespace
 
 SweepWriter::SweepWriter(const std::string& path, const RunInfo& info, IfExists if_exists)
@@ -93,9 +117,30 @@ void SweepWriter::begin() {
   if (!database_->in_transaction()) database_->execute("BEGIN");
 }
 
-void SweepWriter::put_on_disk() {
+void SweepWriter::commit_rows() {
   if (database_->in_transaction()) database_->execute("COMMIT");
   pending_.clear();
+}
+
+// A file without a name takes everything that is written to it, and is gone with the last handle.
+void SweepWriter::put_on_disk() {
+  commit_rows();
+  if (!displaced_ && lost_its_name()) throw SweepFileError(path_ + ": " + displaced);
+}
+
+bool SweepWriter::lost_its_name() {
+  if (displaced_ || !lock_->displaced(path_)) return displaced_;
+  displaced_ = true;
+  return true;
+}
+
+void SweepWriter::write_rescued() {
+  const std::string lost = std::exchange(path_, free_name(path_ + "-rescued"));
+  Statement copy{*database_, "VACUUM INTO ?"};
+  copy.bind(path_).run();
+  // The log would be taken for that of whatever stands under the name now, unless it is.
+  if (!is_in_use(lost)) remove_leftovers(lost);
+  throw SweepFileError(path_ + ": holds what was measured; " + lost + " " + displaced);
 }
 
 void SweepWriter::commit() {
@@ -130,8 +175,12 @@ void SweepWriter::end_part(const std::string& outcome, const std::string& detail
 }
 
 void SweepWriter::finish() {
-  put_on_disk();
+  commit_rows();
   rows_.reset();
+  if (lost_its_name()) {
+    spare_->give_back();
+    write_rescued();
+  }
   try {
     database_->execute("PRAGMA journal_mode = DELETE");
   } catch (const SweepFileError&) {
@@ -149,6 +198,7 @@ void SweepWriter::discard() {
   if (!created_) return;
   rows_.reset();
   database_.reset();
+  if (displaced_) return;  // what stands there now is somebody else's
   if (replaces_) {
     put_old_back(path_);
   } else {

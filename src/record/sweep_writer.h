@@ -32,7 +32,9 @@ class SweepWriter {
   // From here on records are those of a new part. A part before it that was never ended was killed.
   void begin_part(const PartStart& start);
 
-  // Each record becomes a row; a finished dwell is on the disk when this returns.
+  // Each record becomes a row; a finished dwell is on the disk when this returns. Like all that
+  // puts something on the disk this throws SweepFileError where the file has been removed, renamed
+  // or replaced by another one since; once, and the rows are kept.
   void write(const Record& record);
 
   // Puts what is pending on the disk, but never a part of a dwell's points.
@@ -46,7 +48,8 @@ class SweepWriter {
   bool rescue() noexcept;
 
   // The last word: how and when it ended, and the file made one plain file without a log beside it,
-  // unless somebody is reading it or the disk has no room for that.
+  // unless somebody is reading it or the disk has no room for that. What has lost its name is put
+  // down as NAME.sweep-rescued, which is path() then, and SweepFileError says so.
   void end_part(const std::string& outcome, const std::string& detail);
   void finish();
 
@@ -61,12 +64,16 @@ class SweepWriter {
   void open();
   void begin();
   void put_on_disk();
+  void commit_rows();
+  bool lost_its_name();
+  void write_rescued();
   void take_its_place() noexcept;
   void write_head(const RunInfo& info);
 
   std::string path_;
   bool created_;                    // not resumed
   bool replaces_ = false;           // an earlier file, set aside meanwhile
+  bool displaced_ = false;          // it stands under its name no more
   std::unique_ptr<FileLock> lock_;  // outlives the database
   std::unique_ptr<SpareRoom> spare_;
   std::unique_ptr<Database> database_;

@@ -27,9 +27,11 @@ std::string verdict(const Difference& difference) {
                  measure);
   else
     words = text(difference.scatter_known()
-                     ? "%s: no change in %zu points that their scatter does not explain"
-                     : "%s: no change in %zu points that is not tolerated (no scatter is known)",
-                 difference.changed() ? "changed" : "same", difference.points.size());
+                     ? "%s %zu points that their scatter does not explain"
+                     : "%s %zu points that is not tolerated (no scatter is known)",
+                 difference.changed() ? "changed: points are lost, though no change in the other"
+                                      : "same: no change in",
+                 difference.points.size());
   if (difference.lost > 0) words += text("; %zu were good and are not any more", difference.lost);
   const std::size_t others = difference.unusable - difference.lost;
   if (others > 0) words += text("; %zu left out, not good", others);

@@ -1,10 +1,16 @@
 // The commands end to end: output, files and exit codes.
 #include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "record/database.h"
 #include "record/sweep_reader.h"
 #include "support/process.h"
 
@@ -117,6 +123,78 @@ TEST_F(CommandLine, NeverOverwritesWithoutForce) {
   EXPECT_EQ(run({"export", "a.sweep", "-o", "a.csv", "--force"}).code, 0);
 }
 
+// A measurement is not to be had again by trying; nor is what a command reads.
+TEST_F(CommandLine, NeverOverwritesAMeasurementOrAnInputEvenWithForce) {
+  ASSERT_EQ(run({"run", "rig.toml", "-o", "a.sweep"}).code, 0);
+  ASSERT_EQ(run({"run", "rig.toml", "-o", "b.sweep"}).code, 0);
+  ASSERT_EQ(run({"export", "a.sweep", "-o", "a.csv"}).code, 0);
+  const std::vector<std::vector<std::string>> commands{
+      {"export", "a.sweep", "-o", "a.sweep"},
+      {"export", "a.sweep", "-o", "b.sweep"},
+      {"export", "a.sweep", "--format", "mat", "-o", "b.sweep"},
+      {"export", "a.csv", "-o", "./a.csv"},
+      {"report", "a.sweep", "-o", "a.sweep"},
+      {"report", "a.sweep", "--format", "svg", "-o", "b.sweep"},
+      {"compare", "a.csv", "b.sweep", "-o", "a.csv"},
+      {"compare", "a.csv", "b.sweep", "-o", "b.sweep"},
+      {"run", "rig.toml", "-o", "rig.toml"},
+      {"run", "rig.toml", "-o", "notes"}};
+  write("notes", "mine");
+  for (std::vector<std::string> command : commands) {
+    const std::vector<std::string> before{read("a.sweep"), read("b.sweep"), read("a.csv"),
+                                          read("rig.toml"), read("notes")};
+    command.emplace_back("--force");
+    const auto refused = run(command);
+    EXPECT_EQ(refused.code, 2) << command.front() << ' ' << command[command.size() - 2];
+    EXPECT_THAT(refused.err, HasSubstr("error: "));
+    EXPECT_EQ(before, (std::vector<std::string>{read("a.sweep"), read("b.sweep"), read("a.csv"),
+                                                read("rig.toml"), read("notes")}));
+  }
+}
+
+TEST_F(CommandLine, LeavesASweepUnderTheNameOfASweep) {
+  for (const char* name : {"k.csv", "k.MAT", "k.html"}) {
+    const auto refused = run({"run", "rig.toml", "-o", name});
+    EXPECT_EQ(refused.code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("a run leaves a sweep file; call it NAME.sweep"));
+    EXPECT_FALSE(std::filesystem::exists(path(name)));
+  }
+}
+
+TEST_F(CommandLine, FitsWhatItMayNotStoreIn) {
+  ASSERT_EQ(run({"run", "rig.toml", "--no-report"}).code, 0);
+  record::Database{path("rig.sweep"), record::Database::Mode::write}.execute(
+      "CREATE TABLE fit (id INTEGER PRIMARY KEY, created_utc TEXT, input INTEGER, output INTEGER, "
+      "method TEXT, json TEXT);"
+      "CREATE TRIGGER refuse BEFORE INSERT ON fit BEGIN SELECT RAISE(ABORT, 'read only'); END");
+  for (const char* command : {"fit", "margins"}) {
+    const auto fitted = run({command, "rig.sweep"});
+    EXPECT_EQ(fitted.code, 0) << fitted.err;
+    EXPECT_THAT(fitted.err, HasSubstr("the fit is not stored: rig.sweep"));
+    EXPECT_NE(fitted.out, "");
+  }
+}
+
+TEST_F(CommandLine, ComparesWhatWasNotMeasuredAsLost) {
+  ASSERT_EQ(run({"run", "rig.toml", "-o", "whole.sweep", "--no-report"}).code, 0);
+  for (const auto& [outcome, kept] : {std::pair{"killed", 2}, {"stopped", 28}}) {
+    std::filesystem::copy_file(path("whole.sweep"), path("cut.sweep"),
+                               std::filesystem::copy_options::overwrite_existing);
+    const std::string sql = "DELETE FROM point WHERE dwell >= " + std::to_string(kept) +
+                            "; UPDATE run SET value = '" + outcome + "' WHERE key = 'outcome'";
+    record::Database{path("cut.sweep"), record::Database::Mode::write}.execute(sql);
+    const auto compared = run({"compare", "whole.sweep", "cut.sweep"});
+    EXPECT_THAT(compared.err, HasSubstr("cut: its run is not done (" + std::string{outcome} +
+                                        "): " + std::to_string(30 - kept) + " planned points"));
+    EXPECT_EQ(compared.code, kept == 2 ? 5 : 0) << compared.out;
+    if (kept == 2) {
+      EXPECT_THAT(compared.out, HasSubstr("changed: points are lost, though no change in the other "
+                                          "2 points"));
+      EXPECT_THAT(compared.out, HasSubstr("28 were good and are not any more"));
+    }
+  }
+}
+
 TEST_F(CommandLine, NumbersTheDefaultOutput) {
   ASSERT_EQ(run({"run", "rig.toml"}).code, 0);
   ASSERT_EQ(run({"run", "rig.toml"}).code, 0);
@@ -172,6 +250,50 @@ TEST_F(CommandLine, CallsBadUsageTwo) {
   EXPECT_EQ(run({"plan", "rig.toml", "--log-level", "loud"}).code, 2);
 }
 
+TEST_F(CommandLine, NamesTheCommandThatWasMeant) {
+  EXPECT_THAT(run({"fitt", "a.sweep"}).err,
+              HasSubstr("there is no command \"fitt\"; did you mean fit?"));
+  EXPECT_THAT(run({"--log-level", "info", "fly"}).err,
+              HasSubstr("there is no command \"fly\"; sinerig --help lists them"));
+  const auto help = run({"help"});
+  EXPECT_EQ(help.code, 0);
+  EXPECT_EQ(help.out, run({"--help"}).out);
+}
+
+TEST_F(CommandLine, SaysOfAJobFileThatItIsOne) {
+  write("job.toml", "[night]\n[[night.sweep]]\nrig = \"rig.toml\"\n");
+  const auto refused = run({"run", "job.toml"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("job.toml: is a job file, no rig file; `sinerig night"));
+}
+
+// What the README shows is what is said.
+TEST_F(CommandLine, NamesTheKeyThatWasMeantWhereOneIsMissing) {
+  const auto text_of = [](const std::string& name) -> std::string {
+    std::ifstream stream{SINERIG_SOURCE_DIR "/" + name};
+    return {std::istreambuf_iterator<char>{stream}, {}};
+  };
+  std::string text = text_of("config/gimbal.toml");
+  const std::string readme = text_of("README.md");
+  text.replace(text.find("\nstart_hz"), 9, "\nstrat_hz");
+  std::filesystem::create_directory(path("config"));
+  write("config/gimbal.toml", text);
+  const auto refused = run({"plan", "config/gimbal.toml"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("strat_hz: unknown key; did you mean start_hz?"));
+  EXPECT_THAT(readme, HasSubstr(refused.err));
+}
+
+// It would sit in its first tick for hours, and no signal would end it.
+TEST_F(CommandLine, RefusesAPlantTooFastToBeSimulated) {
+  std::string text = rig_text;
+  text.replace(text.find("den = [1, 60]"), 13, "den = [1e-20, 60]");
+  write("stiff.toml", text);
+  const auto refused = run({"plan", "stiff.toml"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("too fast to be simulated at the rate of the loop"));
+}
+
 TEST_F(CommandLine, CallsABadRigFileTwoWithItsPlace) {
   std::string text = rig_text;
   text.replace(text.find("stop_hz = 100"), 13, "stop_hz = 900");
@@ -197,6 +319,38 @@ TEST_F(CommandLine, CallsABadSweepFileOneWithAMessage) {
   const auto channel = run({"export", "rig.sweep", "--channel", "gyr"});
   EXPECT_EQ(channel.code, 1);
   EXPECT_THAT(channel.err, HasSubstr("has no response of \"gyr\"; it has gyro"));
+}
+
+TEST_F(CommandLine, RefusesOptionsWithoutEffect) {
+  ASSERT_EQ(run({"run", "rig.toml", "--no-report"}).code, 0);
+  const auto channel = run({"report", "rig.sweep", "--channel", "gyr"});
+  EXPECT_EQ(channel.code, 1);
+  EXPECT_THAT(channel.err, HasSubstr("has no response of \"gyr\"; it has gyro"));
+  EXPECT_EQ(run({"report", "rig.sweep", "--channel", "gyro"}).code, 0);
+  const auto compared = run({"compare", "rig.sweep", "rig.sweep", "--channel", "gyro"});
+  EXPECT_EQ(compared.code, 2);
+  EXPECT_THAT(compared.err, HasSubstr("--channel chooses the sensor whose model --drift compares"));
+  for (const char* option : {"--rate", "--prewarp"}) {
+    const auto fitted = run({"fit", "rig.sweep", option, "100"});
+    EXPECT_EQ(fitted.code, 2);
+    EXPECT_THAT(fitted.err, HasSubstr("--rate and --prewarp belong to --discrete"));
+  }
+  EXPECT_EQ(run({"fit", "rig.sweep", "--hold", "0", "--no-store", "--json"}).out,
+            run({"fit", "rig.sweep", "--hold", "none", "--no-store", "--json"}).out);
+}
+
+TEST_F(CommandLine, SaysOfEveryFileWhatItIs) {
+  std::filesystem::create_directory(path("adir"));
+  write("junk.sweep", "no sweep at all, but a line of text\n");
+  for (const char* command : {"show", "report", "export", "fit", "margins", "notch"}) {
+    const auto folder = run({command, "adir"});
+    EXPECT_EQ(folder.code, 1) << command;
+    EXPECT_THAT(folder.err, HasSubstr("adir: is a folder; wanted a file")) << command;
+    const auto junk = run({command, "junk.sweep"});
+    EXPECT_EQ(junk.code, 1) << command;
+    EXPECT_THAT(junk.err, testing::AllOf(HasSubstr("junk.sweep: "), HasSubstr("is not a database")))
+        << command;
+  }
 }
 
 TEST_F(CommandLine, CallsAStopByALimitThree) {
@@ -243,6 +397,22 @@ TEST_P(StopSignal, RampsReleasesAndLeavesAReadableFile) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, StopSignal, testing::Values(SIGINT, SIGTERM, SIGHUP));
+
+class AFileTakenAway : public test::ProgramTest {};
+
+// The first point is on the disk; the second would take minutes.
+TEST_F(AFileTakenAway, EndsTheRunAndIsKept) {
+  write("rig.toml", real_time_rig_with("0.01"));
+  test::Program program{{"run", "rig.toml"}, folder_};
+  EXPECT_THAT(program.read_line(), StartsWith("   1/2 "));
+  std::filesystem::remove(path("rig.sweep"));
+  const auto finished = program.finish();
+  EXPECT_EQ(finished.code, 3) << finished.err;
+  EXPECT_THAT(finished.err, HasSubstr("rig.sweep: was removed, renamed or replaced"));
+  EXPECT_EQ(record::read_sweep(path("rig.sweep-rescued")).responses.at(0).points.back().status,
+            "good");
+  EXPECT_FALSE(std::filesystem::exists(path("rig.sweep-wal")));
+}
 
 class AReader : public test::ProgramTest {};
 

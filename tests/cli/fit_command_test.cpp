@@ -112,6 +112,10 @@ TEST_F(FitCommand, RefusesWhatIsNoResponse) {
   refuses("1,1,0\n2,0,0\n3,1,0\n", "the response is exactly zero");
   refuses("1,1,0\n2,one,0\n", "response.csv:2: re is \"one\"; wanted a number");
   refuses("1,1\n", "fewer than three columns");
+  refuses("0,5;0,2;-0,1\n1,5;0,2;-0,1\n",
+          "response.csv:1: the numbers have decimal commas; write points");
+  refuses("freq_hz;re;im\n0,5;0,2;-0,1\n", "response.csv:2: the numbers have decimal commas");
+  refuses("1,1,0\n", "response.csv: response: 1 points");
   refuses("", "holds no points; wanted lines of freq_hz,re,im[,std]");
   refuses("freq_hz,re\n1,1\n", "the header has no column im");
 }
@@ -223,7 +227,7 @@ TEST_F(FitCommand, RefusesOptionsThatMakeNoSense) {
   refuses(lag_csv(), "--delay is \"soon\"; wanted none, fit or seconds",
           "--zeros 0 --poles 1 --delay soon");
   refuses(lag_csv(), "--method hassul needs the orders", "--method hassul");
-  refuses(lag_csv(), "--hold", "--zeros 0 --poles 1 --hold 0");
+  refuses(lag_csv(), "--hold: the rate must be above zero", "--zeros 0 --poles 1 --hold=-5");
   const auto absent = workshop_.sinerig("fit nowhere.csv");
   EXPECT_EQ(absent.exit_code, 2);
   EXPECT_THAT(absent.errors, HasSubstr("nowhere.csv: cannot be read"));

@@ -234,6 +234,9 @@ TEST_F(GimbalSweep, RefusesWhatCannotBeHad) {
   refuses("margins gimbal.sweep --pid 1,2", "--pid: wanted KP,KI,KD");
   refuses("margins gimbal.sweep --controller-num 1,2", "belong together");
   refuses("margins gimbal.sweep --pid 1,2,3", "filter its derivative");
+  refuses("margins gimbal.sweep --pid 1,2,3", "give FILTER_HZ as the fourth number, or --rate 0");
+  EXPECT_EQ(workshop_->sinerig("margins gimbal.sweep --pid 1,2,3").output, "");
+  refuses("notch gimbal.sweep --within 30", "--within 30: must be below the resonance at 2");
   refuses("margins gimbal.sweep --response loop --pid 1,2,3,40", "holds the controller already");
 }
 

@@ -372,9 +372,16 @@ TEST_F(Night, RefusesABadJobBeforeAnythingMoves) {
   EXPECT_THAT(refusal(sweep + sweep), HasSubstr("\"axis\" is the name of an earlier sweep"));
   EXPECT_THAT(refusal(sweep + "name = \"a/b\"\n"), HasSubstr("must be letters, digits, _ and -"));
   EXPECT_THAT(refusal(sweep + "set.sweep.amplitud = 1\n"),
-              HasSubstr("[sweep] amplitud: unknown key; did you mean amplitude?"));
+              HasSubstr("error: night.toml:5: [sweep] amplitud: unknown key; did you mean "
+                        "amplitude? (set for axis.toml)"));
+  EXPECT_THAT(refusal(sweep + "repeat = 2\nset.sweep.amplitude = -3\n"),
+              HasSubstr("error: night.toml:6: [sweep] amplitude = -3: must be above 0"));
+  EXPECT_THAT(refusal(sweep + "set.sweeep.amplitude = 3\n"),
+              HasSubstr("error: night.toml:5: [sweeep]: unknown section; did you mean sweep?"));
   EXPECT_THAT(refusal("[[night.sweep]]\nrig = \"none.toml\"\n"),
-              HasSubstr("none.toml: cannot be read"));
+              HasSubstr("night.toml:4: [night.sweep] rig: none.toml: cannot be read"));
+  EXPECT_THAT(refusal(sweep + "pause_s = 1\nset.limits.command_max = 0.1\n"),
+              HasSubstr("axis.toml:7: [sweep] amplitude = 0.5"));
 }
 
 }  // namespace

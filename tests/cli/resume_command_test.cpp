@@ -238,7 +238,7 @@ TEST_F(RunOrResume, GoesOnWithTheLastSweepOnlyWhereThatEndedEarly) {
 TEST_F(RunOrResume, TheLastIsTheOneWithTheHighestNumber) {
   write("rig.toml", rig("", "4"));
   for (const char* name : {"rig.sweep", "rig-9.sweep", "rig-10.sweep", "rig-11x.sweep",
-                           "rig-.sweep", "rigid-20.sweep", "rig-12.html"}) {
+                           "rig-.sweep", "rigid-20.sweep", "rig-12.run"}) {
     ASSERT_EQ(run({"run", "rig.toml", "-o", name, "--no-report"}).code, 0);
     unfinished(name);
   }

@@ -265,7 +265,8 @@ INSTANTIATE_TEST_SUITE_P(
         Change{"FrictionWithoutAVelocity", 17, "den = [1, 10]\ncoulomb_friction = 1",
                "rig.toml:18: [plant] coulomb_friction = 1: friction needs kind = \"mechanical\", "
                "which has a velocity for it to act on"},
-        Change{"PlantMissing", 14, "[plnt]", "rig.toml: the section [plant] is missing"},
+        Change{"PlantMissing", 14, "[plnt]",
+               "rig.toml:14: [plnt]: unknown section; did you mean plant?"},
         Change{"KeyOfAnotherKind", 17, "den = [1, 10]\ninertia = 2",
                "rig.toml:18: [plant] inertia: unknown key"},
         Change{"MisspeltKey", 9, "comand_max = 1",

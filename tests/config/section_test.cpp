@@ -201,6 +201,23 @@ TEST(RigFile, RefusesKeysThatNobodyHasReadWithTheNearestName) {
   EXPECT_EQ(file_refusal("[sweep]\nstart_hz = 1\n", read), "");
 }
 
+TEST(RigFile, SuspectsASlipOfTheFingerWhereAKeyIsMissing) {
+  const auto read = [](RigFile& file) {
+    const Section s = file.section("sweep");
+    s.number("start_hz", above_zero);
+    s.number("points", above_zero);
+  };
+  for (const char* slip : {"strat_hz", "start_h", "start_hzz", "stert_hz", "Start_Hz"}) {
+    EXPECT_EQ(file_refusal("[sweep]\n\n" + std::string{slip} + " = 3\n", read),
+              "rig.toml:3: [sweep] " + std::string{slip} + ": unknown key; did you mean start_hz?");
+  }
+  EXPECT_EQ(file_refusal("[Sweep]\nstart_hz = 3\n", read),
+            "rig.toml:1: [Sweep]: unknown section; did you mean sweep?");
+  // A key that is only to be read later is none, nor one that is alike by its kind alone.
+  EXPECT_EQ(file_refusal("[sweep]\nstop_hz = 3\n", read),
+            "rig.toml:1: [sweep] start_hz: is missing; it must be above 0");
+}
+
 TEST(RigFile, RefusesUnknownKeysInArraysOfTables) {
   const auto read = [](RigFile& file) {
     for (const Section& mode : file.section("plant").tables("modes")) {

@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 #include <stdexcept>
+#include <string>
 
 #include <gtest/gtest.h>
 
@@ -124,6 +125,24 @@ TEST(NotchWidth, IsThatOfTheDiscreteNotchWhereItHasARate) {
     };
     EXPECT_NEAR(notch.width_hz(), edge(100.0, 240.0) - edge(100.0, 1.0), 1e-3) << rate_hz;
   }
+}
+
+TEST(DesignNotch, SaysHowMuchADampedResonanceAllows) {
+  const UncertainMode damped = uncertain_mode({mode(2.5, 0.001, 0.158)});
+  std::string refusal;
+  try {
+    design_notch(damped, {20.0, 0.6, 0.0});
+  } catch (const std::invalid_argument& error) {
+    refusal = error.what();
+  }
+  const std::string before = " Hz, allows ";
+  const std::size_t at = refusal.find(before);
+  ASSERT_NE(at, std::string::npos) << refusal;
+  const double most_db = std::stod(refusal.substr(at + before.size()));
+  EXPECT_GT(most_db, 10.0);
+  EXPECT_LT(most_db, 20.0);
+  EXPECT_NO_THROW(design_notch(damped, {most_db - 0.5, 0.6, 0.0}));
+  EXPECT_THROW(design_notch(damped, {most_db + 0.5, 0.6, 0.0}), std::invalid_argument);
 }
 
 }  // namespace

@@ -490,6 +490,80 @@ TEST_F(SweepFile, OnAFullDiskStopsTheLoopAndSaysSo) {
   }
 }
 
+// As a user takes the name away, and which file then stands under it.
+struct Displacement {
+  const char* name;
+  void (*take_away)(const std::string& path);
+  const char* left;  // under the name
+};
+
+class DisplacedFile : public SweepFile, public testing::WithParamInterface<Displacement> {
+ protected:
+  static std::string left(const std::string& path) {
+    std::ifstream stream{path};
+    return {std::istreambuf_iterator<char>{stream}, {}};
+  }
+};
+
+TEST_P(DisplacedFile, IsNoticedAtTheNextPointAndKeptUnderAnotherName) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  writer.begin_part({});
+  writer.write(a_point(0));
+  writer.write(DwellTiming{.dwell = 0, .ticks = 100});
+  GetParam().take_away(path());
+  writer.write(a_point(1));
+  try {
+    writer.write(DwellTiming{.dwell = 1, .first_tick = 100, .ticks = 100});
+    FAIL() << "the run goes on";
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("run.sweep: was removed, renamed or replaced"));
+  }
+  EXPECT_TRUE(writer.rescue());
+  writer.end_part("stopped", "no file");
+  try {
+    writer.finish();
+    FAIL() << "nobody is told where the points are";
+  } catch (const SweepFileError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("run.sweep-rescued: holds what was measured"));
+  }
+  EXPECT_EQ(writer.path(), path("run.sweep-rescued"));
+  const StoredRun kept = read_sweep(writer.path());
+  EXPECT_EQ(kept.responses.at(0).points.size(), 2U);
+  EXPECT_EQ(kept.fact("outcome"), "stopped");
+  EXPECT_EQ(left(path()), GetParam().left);
+}
+
+TEST_P(DisplacedFile, IsNoticedAtTheVeryEnd) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  writer.begin_part({});
+  writer.end_part("done", "");
+  GetParam().take_away(path());
+  EXPECT_THROW(writer.finish(), SweepFileError);
+  EXPECT_EQ(read_sweep(path("run.sweep-rescued")).fact("outcome"), "done");
+}
+
+TEST_P(DisplacedFile, IsLeftToWhoeverTookTheNameWhereTheRunNeverBegins) {
+  SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
+  GetParam().take_away(path());
+  EXPECT_THROW(writer.begin_part({}), SweepFileError);
+  writer.discard();
+  EXPECT_EQ(left(path()), GetParam().left);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Ways, DisplacedFile,
+    testing::Values(Displacement{"removed", [](const std::string& path) { fs::remove(path); }, ""},
+                    Displacement{"renamed",
+                                 [](const std::string& path) { fs::rename(path, path + "-kept"); },
+                                 ""},
+                    Displacement{"replaced",
+                                 [](const std::string& path) {
+                                   std::ofstream{path + ".new"} << "another";
+                                   fs::rename(path + ".new", path);
+                                 },
+                                 "another"}),
+    [](const auto& each) { return each.param.name; });
+
 TEST_F(SweepFile, IsWrittenByAThreadBesideTheLoop) {
   Outbox outbox{64, 1 << 12, Outbox::WhenFull::wait};
   SweepWriter writer{path(), an_info(), SweepWriter::IfExists::refuse};
