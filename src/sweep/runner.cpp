@@ -11,6 +11,10 @@ namespace {
 // A slow loop that misses a few ticks has not lost its clock, however long that takes.
 constexpr std::uint64_t min_lost_ticks = 10;
 
+// A sensor that misses ticks more often than that is slower than the loop, or loses so much that
+// its points tell; events would only be many.
+constexpr std::uint64_t ticks_of_a_steady_sensor = 100;
+
 // With room for those that refinement adds.
 std::vector<const Dwell*> dwells_of(const SweepPlan& plan) {
   std::vector<const Dwell*> dwells;
@@ -75,7 +79,7 @@ SweepRunner::SweepRunner(SweepPlan plan, RunnerSettings settings, Clock& clock, 
                   ? Deputy::Where::own_thread
                   : Deputy::Where::at_once},
       observations_(1 + sensors.size()),
-      sensor_faults_(sensors.size(), Fault::none),
+      sensor_states_(sensors.size()),
       preflight_{settings_.preflight.wanted} {
   Measurement& measurement = run_.measurement();
   if (settings_.real_time) measurement.solve_elsewhere();
@@ -222,20 +226,19 @@ bool SweepRunner::applied_late(std::int64_t offset_ns) noexcept {
 void SweepRunner::note_sensor(std::size_t sensor, const Sample& sample,
                               std::uint64_t tick) noexcept {
   if (sample.fault == Fault::range) run_.note_range_fault(sensor);
-  // A sensor slower than the loop is stale in every other tick: its age is what is watched.
-  const auto good = [](Fault fault) {
-    return fault == Fault::none || fault == Fault::stale;
-  };
-  const bool was_good = good(sensor_faults_[sensor]);
-  const bool is_good = good(sample.fault);
-  if (was_good != is_good) {
+  SensorState& state = sensor_states_[sensor];
+  const bool is_good = sample.fault == Fault::none;
+  const bool stale_again =
+      sample.fault == Fault::stale && state.good_ticks < ticks_of_a_steady_sensor;
+  state.good_ticks = is_good ? state.good_ticks + 1 : 0;
+  if (is_good == state.told_faulty && !stale_again) {
+    state.told_faulty = !is_good;
     announce({.kind = is_good ? EventKind::sensor_recovered : EventKind::sensor_fault,
               .fault = sample.fault,
               .channel = static_cast<std::uint16_t>(first_sensor_channel + sensor),
               .dwell = dwell_,
               .tick = tick});
   }
-  sensor_faults_[sensor] = sample.fault;
 }
 
 }  // namespace sinerig

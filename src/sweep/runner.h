@@ -120,7 +120,11 @@ class SweepRunner {
   bool remeasuring_ = false;               // what was modelled with modes that turned out wrong
   std::vector<Observation> observations_;  // applied, sensors: this tick
   double command_ = 0.0;                   // this tick
-  std::vector<Fault> sensor_faults_;       // of the last tick
+  struct SensorState {
+    std::uint64_t good_ticks = 0;  // in a row
+    bool told_faulty = false;
+  };
+  std::vector<SensorState> sensor_states_;
 
   std::uint32_t dwell_ = 0;
   double scale_ = 1.0;         // of this dwell's planned amplitudes
