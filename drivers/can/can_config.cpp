@@ -171,7 +171,8 @@ void ConfigReader::convert_unit(const Keys& keys, Signal& signal) const {
   convert_to_unit_of(keys.base(), signal);
   if (!keys.over()) return;
   const config::Section& rig = *keys.over();
-  if (rig.has("unit") && keys.base().has("unit") && !rig.has("unit_scale") &&
+  const bool converted = rig.has("unit_scale") && rig.number("unit_scale", any_number) != 1.0;
+  if (rig.has("unit") && keys.base().has("unit") && !converted &&
       rig.text("unit") != keys.base().text("unit"))
     rig.refuse("unit", "the profile's is \"" + keys.base().text("unit") +
                            "\"; give unit_scale: how many of this unit are one of the profile's");

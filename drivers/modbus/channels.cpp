@@ -68,7 +68,7 @@ void require_pace(const Link& link, const Pace& pace) {
 
 ModbusActuator::ModbusActuator(Link& link, CommandSettings settings)
     : link_{link}, settings_{std::move(settings)}, violated_{no_rule} {
-  link_.command(settings_.place, settings_.neutral);
+  link_.command(settings_.place);
   for (const HealthRule& rule : settings_.health)
     health_fields_.push_back(link_.watch(rule.place, "[actuator] health, " + rule.name));
   health_.resize(settings_.health.size());
@@ -144,7 +144,7 @@ Fault ModbusActuator::unknown_for_long() const noexcept {
 }
 
 Fault ModbusActuator::judge() noexcept {
-  if (link_.overrun()) return Fault::timeout;  // the last command has never gone out
+  if (link_.overrun() && !link_.silent()) return Fault::timeout;  // it has never gone out
   if (!link_.fresh()) return unknown_for_long();
   const Exchange& exchange = link_.newest();
   switch (exchange.fate) {

@@ -22,6 +22,13 @@ bool joins(const Request& question, const Place& place, std::size_t read_through
          new_end - question.read_address <= max_read_registers;
 }
 
+void write_into(Request& question, const Place& command) {
+  question.write_address = command.address;
+  question.write_count = static_cast<std::uint16_t>(command.words());
+}
+
+}  // namespace
+
 Request reading(const Place& place) {
   Request question;
   question.unit = place.unit;
@@ -30,13 +37,6 @@ Request reading(const Place& place) {
   question.read_count = static_cast<std::uint16_t>(place.words());
   return question;
 }
-
-void write_into(Request& question, const Place& command) {
-  question.write_address = command.address;
-  question.write_count = static_cast<std::uint16_t>(command.words());
-}
-
-}  // namespace
 
 ExchangePlan ExchangePlan::make(const std::vector<Place>& places, const Place* command,
                                 Writing writing, std::size_t read_through) {

@@ -33,6 +33,9 @@ enum class Writing : std::uint8_t {
   single,          // function 6, then 3: numbers of one register
 };
 
+// The question for one number.
+Request reading(const Place& place);
+
 inline constexpr std::size_t max_fields = 32;
 
 struct Field {

@@ -65,21 +65,25 @@ void Link::serve_one() noexcept {
 void Link::reconnect_now_and_then() noexcept {
   const std::int64_t now_ns = monotonic_now_ns();
   if (now_ns < next_reconnect_ns_) return;
-  if (connect_and_hear()) pause_ns_ = first_pause_ns;
+  if (connect_and_hear()) {
+    pause_ns_ = first_pause_ns;
+    silent_.store(false, std::memory_order_relaxed);
+  }
   next_reconnect_ns_ = monotonic_now_ns() + pause_ns_;
   if (!transport_.connected()) pause_ns_ = std::min(2 * pause_ns_, longest_pause_ns);
 }
 
 // Many a device that has stopped reading is still connected to by its system, and would carry out,
-// later, what it was sent. It gets set-points again when it has answered something harmless.
+// later, what it was sent. It gets set-points again when it has answered a question, be it with an
+// exception: of what is read anyway, or of where its command is.
 bool Link::connect_and_hear() noexcept {
   if (!transport_.try_connect()) return false;
   if (settings_.connection.serial) return true;
-  const std::int64_t deadline_ns = monotonic_now_ns() + settings_.response_timeout_ns;
-  const Answer answer =
-      reading_plan_.questions.empty()
-          ? write_number(transport_, *command_, neutral_, settings_.writing, deadline_ns)
-          : transport_.ask(reading_plan_.questions.front(), deadline_ns, registers_);
+  const Request question =
+      reading_plan_.questions.empty() ? reading(*command_) : reading_plan_.questions.front();
+  const std::int64_t deadline_ns =
+      monotonic_now_ns() + std::max(settings_.response_timeout_ns, hearing_ns);
+  const Answer answer = transport_.ask(question, deadline_ns, registers_);
   if (answer.outcome != Outcome::timeout) return transport_.connected();
   note_failure(answer);
   transport_.give_up();
@@ -127,10 +131,13 @@ void Link::perform(const Order& order, std::int64_t patience_ns, Exchange& excha
     if (question.writes()) {
       exchange.command_ns = answer.time_ns;
       const bool taken = answer.outcome == Outcome::ok;
-      exchange.fate = taken                                     ? CommandFate::confirmed
-                      : answer.outcome == Outcome::exception    ? CommandFate::refused
-                      : answer.outcome == Outcome::disconnected ? CommandFate::not_sent
-                                                                : CommandFate::unconfirmed;
+      exchange.fate = taken                                  ? CommandFate::confirmed
+                      : answer.outcome == Outcome::exception ? CommandFate::refused
+                      : answer.outcome == Outcome::disconnected && !silent()
+                          ? CommandFate::not_sent
+                          : CommandFate::unconfirmed;
+      if (answer.outcome == Outcome::timeout && !transport_.connected())
+        silent_.store(true, std::memory_order_relaxed);
     }
     exchange.withheld = exchange.withheld || answer.withheld;
     lost = lost || (answer.outcome != Outcome::ok && !answer.withheld);

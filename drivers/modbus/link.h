@@ -48,10 +48,7 @@ class Link {
 
   // Before open(): a number to be read at every tick; its index among the fields of an exchange.
   std::size_t watch(const Place& place, std::string label);
-  void command(const Place& place, double neutral) {
-    command_ = place;
-    neutral_ = neutral;
-  }
+  void command(const Place& place) { command_ = place; }
 
   // Connects, reads everything once, starts the thread. Throws std::runtime_error; StopRequested,
   // as try_out(), where a stop is.
@@ -91,6 +88,9 @@ class Link {
   void tick(std::optional<double> command) noexcept SINERIG_NONBLOCKING;
   bool fresh() const noexcept { return fresh_; }      // an exchange has ended since the last tick
   bool overrun() const noexcept { return overrun_; }  // the last order was never taken up
+  // The device has not answered, and is given set-points again when it has: nothing of them is
+  // known, which is no failure until it has lasted for too long.
+  bool silent() const noexcept { return silent_.load(std::memory_order_relaxed); }
   std::int64_t tick_ns() const noexcept { return tick_ns_; }
   const Exchange& newest() const noexcept { return newest_; }
 
@@ -132,13 +132,16 @@ class Link {
   // Between two attempts: a device that restarts is often back after a few ticks.
   static constexpr std::int64_t first_pause_ns = 10'000'000;
   static constexpr std::int64_t longest_pause_ns = 100'000'000;
+  // For the first answer on a new connection, which a gateway may be slow to give.
+  static constexpr std::int64_t hearing_ns = 50'000'000;
+  // For a device that takes one connection, and is slow to notice that the last one has ended.
+  static constexpr int tries_to_reconnect = 20;
 
   LinkSettings settings_;
   Waiting waiting_;
   std::vector<Place> places_;
   std::vector<std::string> labels_;
   std::optional<Place> command_;
-  double neutral_ = 0.0;
 
   // The loop's.
   Mailbox<Order> orders_;      // loop → thread
@@ -168,6 +171,7 @@ class Link {
   int wake_ = -1;
   std::optional<realtime::Grant> scheduling_;
   std::atomic<bool> stop_{false};
+  std::atomic<bool> silent_{false};
   std::thread thread_;
 };
 

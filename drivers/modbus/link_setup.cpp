@@ -119,7 +119,11 @@ void Link::open() {
 void Link::reconnect() {
   const std::scoped_lock lock{mutex_};
   if (!settings_.connection.serial) transport_.give_up();
-  if (transport_.connected() || transport_.try_connect()) return;
+  silent_.store(false, std::memory_order_relaxed);
+  for (int n = 0; n < tries_to_reconnect; ++n) {
+    if (transport_.connected() || transport_.try_connect()) return;
+    if (!waiting_.pause_for(Waiting::turn_ns)) throw StopRequested{};
+  }
   throw std::runtime_error(settings_.connection.address() +
                            ": no connection; is the device powered and on the network?");
 }

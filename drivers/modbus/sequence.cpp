@@ -23,16 +23,11 @@ struct Reading {
 };
 
 Reading read_number(Transport& transport, const Place& place, std::int64_t deadline_ns) noexcept {
-  Request question;
-  question.unit = place.unit;
-  question.function = place.table == Table::holding ? Function::read_holding : Function::read_input;
-  question.read_address = place.address;
-  question.read_count = static_cast<std::uint16_t>(place.words());
   std::array<std::uint16_t, max_words> registers{};
-  Reading reading;
-  reading.answer = transport.ask(question, deadline_ns, registers);
-  if (reading.answer.outcome == Outcome::ok) reading.value = decode(registers, place.format);
-  return reading;
+  Reading found;
+  found.answer = transport.ask(reading(place), deadline_ns, registers);
+  if (found.answer.outcome == Outcome::ok) found.value = decode(registers, place.format);
+  return found;
 }
 
 bool done(const Answer& answer) noexcept {

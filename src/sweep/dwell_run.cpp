@@ -87,7 +87,9 @@ void DwellRun::pass(const Tick& tick, std::uint64_t ticks) noexcept {
 // sensor sample has not: it leaves the regression.
 void DwellRun::measure(std::uint64_t tick, std::span<const Observation> observations,
                        bool disturbed) noexcept {
-  if (disturbed) {
+  if (disturbed && measurement_.done()) {
+    // What has been measured stands; a read-back is judged by what follows.
+  } else if (disturbed) {
     ++timing_.resettles;
     settle_left_ = std::max(settle_left_, dwell_->settle_samples);
     measurement_.disturb();

@@ -210,6 +210,44 @@ TEST_P(ModbusStall, LeavesFewSetPointsAndNoOrderToSwitchOnForADriveThatGoesOn) {
   EXPECT_EQ(actuator->reason(), "") << "what has failed before is not what is wrong now";
 }
 
+// Its age is what ends a sweep, and what it is asked before it gets set-points again moves nothing:
+// the sine may be far from neutral.
+TEST_P(ModbusStall, IsNoFaultBeforeItIsTooOldAndNoNeutral) {
+  const bool with_sensor = GetParam();
+  HeldDrive drive;
+  Link link{to(drive)};
+  CommandSettings settings = command();
+  settings.max_age_ns = 100 * generous_ns;
+  std::optional<ModbusActuator> actuator{std::in_place, link, settings};
+  std::optional<ModbusSensor> sensor;
+  if (with_sensor) sensor.emplace(link, FeedbackSettings{number_at(34)}, "[sensor.position]", true);
+  link.open();
+  actuator->start();
+  actuator->arm();
+  drive_on(link, *actuator, 5);
+
+  drive.hold();
+  while (!link.silent()) {
+    actuator->write(1.0);
+    std::this_thread::yield();
+  }
+  for (int n = 0; n < 1000; ++n) {
+    const Fault fault = actuator->write(1.0).fault;
+    ASSERT_TRUE(fault == Fault::none || fault == Fault::stale) << to_string(fault);
+    std::this_thread::yield();
+  }
+  drive.let_go();
+  while (link.silent() || link.newest().fate != CommandFate::confirmed) {
+    actuator->write(1.0);
+    std::this_thread::yield();
+  }
+  for (const auto& [address, value] : drive.writes()) {
+    if (address == 16) {
+      EXPECT_NE(value, 0.0);
+    }
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Of, ModbusStall, testing::Values(false, true), [](const auto& of) {
   return of.param ? "ADriveThatIsRead" : "ADriveThatIsOnlyWritten";
 });
