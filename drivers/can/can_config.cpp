@@ -49,7 +49,9 @@ const Dbc& ConfigReader::dbc(const Keys& keys) {
   const auto known = dbcs_.find(path);
   if (known != dbcs_.end()) return known->second;
   return at_key(holder, "dbc", [&]() -> const Dbc& {
-    return dbcs_.emplace(path, Dbc::read_file(path)).first->second;
+    const Dbc& read = dbcs_.emplace(path, Dbc::read_file(path)).first->second;
+    holder.at("dbc").include(path);
+    return read;
   });
 }
 

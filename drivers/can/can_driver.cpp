@@ -202,6 +202,8 @@ class CanDevice final : public Device {
       reader.feedback(Keys{feedback, profile.folder});
     }
     profile.file->refuse_unread();
+    section.include(path);
+    for (const auto& [dbc, digest] : profile.file->included()) section.include(dbc);
     profiles_.push_back(std::move(profile));
     return profiles_.back();
   }

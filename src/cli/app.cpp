@@ -261,9 +261,6 @@ int run_command_line(int argc, char** argv, const std::vector<DriverKit>& driver
   } catch (const record::FileInUse& error) {
     spdlog::error("{}", error.what());
     return exit_usage;
-  } catch (const InputError& error) {
-    spdlog::error("{}", error.what());
-    return exit_usage;
   } catch (const std::invalid_argument& error) {
     spdlog::error("{}", error.what());
     return exit_usage;

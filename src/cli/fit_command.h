@@ -47,8 +47,8 @@ struct FitCommandOptions {
 // Throws as fit_command does.
 report::FitReport fit_files(const FitCommandOptions& options);
 
-// fit_files, and prints the model. Throws std::invalid_argument,
-// InputError and record::SweepFileError. Exit code 1 when the fit has not converged.
+// fit_files, and prints the model. Throws std::invalid_argument and
+// record::SweepFileError. Exit code 1 when the fit has not converged.
 int fit_command(const FitCommandOptions& options);
 
 }  // namespace sinerig::cli

@@ -30,7 +30,7 @@ std::string lower_case(std::string text) {
 bool is_sweep_file(const std::string& path) {
   refuse_folder(path);
   std::ifstream file{path, std::ios::binary};
-  if (!file) throw InputError(path + ": cannot be read; check the name");
+  if (!file) throw record::SweepFileError(path + ": cannot be read; check the name");
   std::string magic(15, '\0');
   file.read(magic.data(), static_cast<std::streamsize>(magic.size()));
   return magic == "SQLite format 3" || lower_case(path).ends_with(".sweep");
@@ -58,8 +58,8 @@ FitInput from_run(const record::StoredRun& run, const std::string& path,
     return channel.empty() || is_named(run, r, channel);
   });
   if (wanted == run.responses.end()) {
-    throw InputError(path + ": has no response of \"" + channel + "\"; it has" +
-                     names_of_responses(run));
+    throw record::SweepFileError(path + ": has no response of \"" + channel + "\"; it has" +
+                                 names_of_responses(run));
   }
   FitInput input;
   input.rate_hz = run.plan.rate_hz;
@@ -90,7 +90,7 @@ FitInput from_run(const record::StoredRun& run, const std::string& path,
 
 void take_hold(FitInput& input, double hold_hz) {
   if (!(hold_hz >= 0.0) || !std::isfinite(hold_hz))
-    throw InputError("--hold: wanted the rate of the hold in Hz, or 0 for none");
+    throw std::invalid_argument("--hold: wanted the rate of the hold in Hz, or 0 for none");
   input.hold_hz = hold_hz;
   if (input.rate_hz == 0.0) input.rate_hz = hold_hz;
 }

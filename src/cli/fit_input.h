@@ -27,7 +27,7 @@ struct FitInput {
 
 // A sweep file: the good points of the channel (the first sensor where it is empty), scatter pooled
 // over neighbours. .mat, .uff and .unv: the same, as read_measured reads them. Anything else: CSV,
-// as read_csv_response takes it. Throws InputError and record::SweepFileError.
+// as read_csv_response takes it. Throws std::invalid_argument and record::SweepFileError.
 FitInput read_fit_input(const std::string& path, const std::string& channel,
                         bool trust_units = false);
 

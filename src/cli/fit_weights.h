@@ -18,7 +18,7 @@ struct WeightOptions {
 };
 
 // One weight per point. column: what the file of the response holds. Throws std::invalid_argument
-// and InputError for what is no weight or not as many as there are points.
+// and record::SweepFileError for what is no weight or not as many as there are points.
 std::vector<double> weights_of(const WeightOptions& options, const std::vector<double>& column,
                                const identify::Response& response);
 

@@ -119,8 +119,8 @@ KnownModes modes_of_file(const std::string& path, const std::vector<std::string>
       if (run.channels.at(response.output).name == name) variance = noise_variance(response);
     }
     if (!(variance > 0.0)) {
-      throw InputError(path + ": holds no good point of \"" + name +
-                       "\", so its noise is not known; take another prior, or none");
+      throw record::SweepFileError(path + ": holds no good point of \"" + name +
+                                   "\", so its noise is not known; take another prior, or none");
     }
     known.noise_variance.push_back(variance);
   }

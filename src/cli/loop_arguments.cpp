@@ -1,5 +1,8 @@
 #include "cli/loop_arguments.h"
 
+#include <map>
+#include <string>
+
 namespace sinerig::cli {
 
 void add_loop_options(CLI::App& command, LoopOptions& options) {
@@ -15,10 +18,13 @@ void add_loop_options(CLI::App& command, LoopOptions& options) {
   command.add_option("--rate", options.rate_hz,
                      "rate in Hz that the controller runs at, by Tustin behind a zero-order hold; "
                      "0: continuous (default: the loop rate of a sweep file)");
-  command.add_option(
-      "--hold", options.hold_hz,
-      "rate in Hz of the zero-order hold that the plant was measured behind, 0: none "
-      "(default: what the file says); the model is made without it");
+  command
+      .add_option(
+          "--hold", options.hold_hz,
+          "rate in Hz of the zero-order hold that the plant was measured behind, none or 0: "
+          "there was none (default: what the file says); the model is made without it")
+      ->transform(
+          CLI::Transformer{std::map<std::string, std::string>{{"none", "0"}}}.description(""));
   command.add_option("--loop-delay", options.delay_s,
                      "more delay in the loop, seconds: calculation, transport");
 }

@@ -99,7 +99,7 @@ void warn_of_unknown_hold(const LoopOptions& options, const FitInput& measured) 
   if (measured.rate_hz > 0.0 || options.hold_hz || !(loop_rate_hz(options, measured) > 0.0)) return;
   spdlog::warn(
       "{} does not say the rate of the loop that it was measured in; if a hold drove the plant it "
-      "is counted twice here: --hold HZ takes it out, --hold 0 says that there was none",
+      "is counted twice here: --hold HZ takes it out, --hold none says that there was none",
       measured.label);
 }
 

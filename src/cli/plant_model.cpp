@@ -11,6 +11,7 @@
 #include <spdlog/spdlog.h>
 
 #include "cli/fit_command.h"
+#include "record/database.h"
 #include "record/fit_store.h"
 #include "report/fit_report.h"
 
@@ -57,7 +58,7 @@ void read_json(const Json& json, PlantModel& model) {
       model.root_covariance.covariance(i, k) =
           number_or_nan(rows.at(static_cast<std::size_t>(i)).at(static_cast<std::size_t>(k)));
   if (size != identify::coordinates_of(model.zpk))
-    throw InputError("the covariance does not belong to the roots");
+    throw record::SweepFileError("the covariance does not belong to the roots");
 }
 
 std::string fitted(const std::string& file, const std::string& channel, const std::string& hold,
@@ -151,7 +152,8 @@ PlantModel read_plant_model(const std::string& file, const std::string& channel,
   try {
     read_json(parsed, model);
   } catch (const std::exception&) {
-    throw InputError(file + ": its stored fit lacks what is needed; make a new one with --refit");
+    throw record::SweepFileError(
+        file + ": its stored fit lacks what is needed; make a new one with --refit");
   }
   if (stored) warn_of_stored(file, parsed, model);
   return model;

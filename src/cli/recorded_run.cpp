@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include "cli/found_modes.h"
+#include "cli/included_files.h"
 #include "cli/played_run.h"
 #include "cli/real_time.h"
 #include "cli/report_file.h"
@@ -118,12 +119,21 @@ bool without_review(const SweepPlan& plan, const SweepRunner& runner,
          std::any_of(finished.points.begin(), finished.points.end(), modelled);
 }
 
+void refuse_changed_include(const record::StoredRun& run, const config::Rig& rig,
+                            const std::string& sweep_file) {
+  const std::string changed = changed_include(run, rig);
+  if (changed.empty()) return;
+  throw config::ConfigError(changed + ": has changed since the run of " + sweep_file +
+                            " began; put it back to go on with that run, or begin a new one");
+}
+
 }  // namespace
 
 record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan) {
   record::RunInfo info{
       .rig_name = rig.file->name(),
       .rig_text = rig.file->text(),
+      .included = included_text(rig),
       .clock = rig.clock == config::ClockKind::virtual_time ? "virtual" : "monotonic",
       .channels = {{"command", rig.actuator.unit}, {"applied", rig.actuator.unit}},
       .plan = plan};
@@ -135,6 +145,7 @@ record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan) {
 int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedRunOptions& options,
                const OpenSweepFile& open_file, const record::UnfinishedRun* earlier) {
   const config::Rig& rig = configured.rig();
+  if (earlier != nullptr) refuse_changed_include(earlier->stored, rig, options.sweep_file);
   Clock& clock = configured.clock();
   RunControl& control = configured.control();
   const StopOnSignal stop_on_signal{control};

@@ -6,6 +6,7 @@
 #include <spdlog/spdlog.h>
 
 #include "cli/commands.h"
+#include "cli/included_files.h"
 #include "cli/recorded_run.h"
 #include "record/file_lock.h"
 
@@ -61,6 +62,11 @@ bool goes_on(const std::string& sweep_file, const config::Rig& rig, const SweepP
     if (earlier.stored.fact("rig_text") != rig.file->text()) {
       spdlog::info("{} is not finished, but {} has changed since: a new sweep begins", sweep_file,
                    rig.file->name());
+      return false;
+    }
+    if (const std::string changed = changed_include(earlier.stored, rig); !changed.empty()) {
+      spdlog::info("{} is not finished, but {} has changed since: a new sweep begins", sweep_file,
+                   changed);
       return false;
     }
     record::candidates_refined(sweep_file, earlier.stored.plan, plan);

@@ -1,4 +1,7 @@
 #include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <utility>
@@ -46,6 +49,20 @@ std::string suggestion(const std::string& nearest_name) {
 // "a.b.c" → "c"
 std::string last_word(const std::string& path) {
   return path.substr(path.rfind('.') + 1);
+}
+
+// Tells an edited file from the one before: FNV-1a of 64 bits, and the length.
+std::string digest_of(const std::string& path) {
+  std::ifstream stream{path, std::ios::binary};
+  std::uint64_t hash = 0xcbf29ce484222325U;
+  std::size_t length = 0;
+  for (char each = 0; stream.get(each); ++length) {
+    hash = (hash ^ static_cast<unsigned char>(each)) * 0x100000001b3U;
+  }
+  char text[48];
+  std::snprintf(text, sizeof text, "%zu bytes, %016llx", length,
+                static_cast<unsigned long long>(hash));
+  return text;
 }
 
 }  // namespace
@@ -124,6 +141,10 @@ std::vector<Section> RigFile::children(std::string_view parent) {
   children.reserve(found.size());
   for (auto& [line, child] : found) children.push_back(std::move(child));
   return children;
+}
+
+void RigFile::include(const std::string& path) {
+  included_[std::filesystem::absolute(path).lexically_normal().string()] = digest_of(path);
 }
 
 void RigFile::refuse_unread() const {

@@ -114,6 +114,10 @@ bool Section::has(std::string_view key) const {
   return node_->table->get(key) != nullptr;
 }
 
+void Section::include(const std::string& path) const {
+  file_->include(path);
+}
+
 void Section::refuse(std::string_view key, std::string_view rule) const {
   const toml::node* node = node_->table->get(key);
   if (node == nullptr) {

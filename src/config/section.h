@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
+#include <map>
 #include <memory>
 #include <optional>
 #include <set>
@@ -81,6 +82,9 @@ class Section {
   // [[section.key]]; empty where the key is missing.
   std::vector<Section> tables(std::string_view key) const;
 
+  // See RigFile::include.
+  void include(const std::string& path) const;
+
   // Throws with this key's place and value.
   [[noreturn]] void refuse(std::string_view key, std::string_view rule) const;
 
@@ -114,6 +118,12 @@ class RigFile {
   // The tables under `parent` in the order of the file: [sensor.encoder], [sensor.gyro].
   std::vector<Section> children(std::string_view parent);
 
+  // What this file means depends on that one, too: a device profile, a DBC.
+  void include(const std::string& path);
+
+  // A digest of each such file, as it was then, by its absolute path.
+  const std::map<std::string, std::string>& included() const { return included_; }
+
   // Throws at the first key or section that nobody has asked for.
   void refuse_unread() const;
 
@@ -130,6 +140,7 @@ class RigFile {
   std::unique_ptr<Document> document_;
   std::set<std::string> known_;  // pattern.key
   std::set<std::string> read_;   // name.key and names of sections
+  std::map<std::string, std::string> included_;
 };
 
 }  // namespace sinerig::config

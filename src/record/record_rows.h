@@ -22,7 +22,8 @@ struct ChannelInfo {
 struct RunInfo {
   std::string rig_name;
   std::string rig_text;
-  std::string clock;  // "virtual" or "monotonic"
+  std::string included{};  // a line of each file that the rig file leads to, with its digest
+  std::string clock;       // "virtual" or "monotonic"
   std::vector<ChannelInfo> channels;
   SweepPlan plan;
 };

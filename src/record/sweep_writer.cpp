@@ -105,6 +105,7 @@ void SweepWriter::write_head(const RunInfo& info) {
   set("rig_name", info.rig_name);
   set("rig_path", std::filesystem::absolute(info.rig_name).lexically_normal().string());
   set("rig_text", info.rig_text);
+  if (!info.included.empty()) set("included", info.included);
   Statement channel{*database_, "INSERT INTO channel VALUES (?, ?, ?)"};
   for (std::size_t i = 0; i < info.channels.size(); ++i) {
     channel.bind(i, info.channels[i].name, info.channels[i].unit).run();

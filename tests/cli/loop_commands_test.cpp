@@ -344,6 +344,7 @@ TEST(MarginsCommand, CountsTheHoldOfAnExportedResponseOnce) {
   EXPECT_NEAR(margin("bare.csv --hold 2000"), of_sweep, 0.05);
   const auto bare = workshop.sinerig("margins bare.csv" + pid_at);
   EXPECT_THAT(bare.errors, HasSubstr("does not say the rate of the loop"));
+  EXPECT_EQ(margin("bare.csv --hold none"), margin("bare.csv --hold 0"));
   ASSERT_EQ(workshop.sinerig("fit axis.sweep --hold none").exit_code, 0);
   EXPECT_NEAR(margin("axis.sweep"), of_sweep, 0.05);
 }

@@ -292,8 +292,9 @@ TEST_F(Formats, ReadsUffOfOtherPrograms) {
 }
 
 TEST_F(Formats, ReadsPlainCsv) {
-  workshop_.write("c.csv", "1,1,0,0.1\n10;0\n");
-  EXPECT_THAT(refusal("c.csv", "1,1,0,0.1\n10,x,0,0.1\n"), HasSubstr("c.csv:2: re = \"x\""));
+  EXPECT_THAT(refusal("c.csv", "1,1,0,0.1\n10,x,0,0.1\n"),
+              HasSubstr("c.csv:2: re is \"x\"; wanted a number"));
+  EXPECT_THAT(refusal("c.csv", "0,5;0,2;-0,1\n"), HasSubstr("c.csv:1: the numbers have decimal"));
   workshop_.write("d.csv", "10,0.5,-0.5,0.1\n1,1,0,0.1\n");
   const auto plain = import_responses(path("d.csv"));
   ASSERT_EQ(plain[0].points.size(), 2U);
@@ -312,9 +313,10 @@ TEST_F(Formats, ReadsPolarCsvInRadPerSecond) {
 }
 
 TEST_F(Formats, RefusesWithPlaceAndRule) {
-  EXPECT_THAT(refusal("a.csv", "freq,re,im\n1,2,3\n"), HasSubstr("a.csv:1: no column freq_hz"));
+  EXPECT_THAT(refusal("a.csv", "freq,re,im\n1,2,3\n"),
+              HasSubstr("a.csv:1: the header has no column freq_hz"));
   EXPECT_THAT(refusal("a.csv", "freq_hz,gain,phase\n1,2,3\n"),
-              HasSubstr("phase_deg (or phase_rad)"));
+              HasSubstr("a.csv:1: the header has no column phase_deg"));
   EXPECT_THAT(refusal("a.csv", "freq_hz,re,im\n0,2,3\n"),
               HasSubstr("a.csv: has no point at a frequency above zero"));
   EXPECT_THAT(refusal("a.csv", "# nothing\n"), HasSubstr("holds no point"));
