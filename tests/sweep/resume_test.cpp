@@ -18,14 +18,14 @@ sim::SimulatedRigSettings resonant_rig(double noise_rms) {
   return rig;
 }
 
-SweepPlan levelled_plan() {
+SweepPlan levelled_plan(std::uint32_t refine_points = 4) {
   SweepSettings sweep;
   sweep.start_hz = 0.5;
   sweep.stop_hz = 20.0;
   sweep.points = 12;
   sweep.amplitude = 1.0;
   sweep.level = {.response = 0.5, .most_response = 1.5, .least_amplitude = 1e-3, .retries = 2};
-  sweep.refine_points = 4;
+  sweep.refine_points = refine_points;
   sweep.refine_db = 0.05;
   return plan_sweep(sweep, {}, 200.0);
 }
@@ -88,7 +88,8 @@ double first_amplitude(const Measured& run, std::uint32_t dwell) {
 class GoingOn : public testing::TestWithParam<std::uint32_t> {};
 
 TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
-  const SweepPlan plan = levelled_plan();
+  // Beside the resonance; further places would be as good as each other.
+  const SweepPlan plan = levelled_plan(2);
   const Measured whole = run_from(plan, 0.0, {});
   ASSERT_FALSE(whole.outcome.trip.tripped());
   ASSERT_GT(whole.dwells, plan.dwells.size()) << "nothing was refined";
@@ -102,7 +103,7 @@ TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
     const Point& b = rest.sink.points[i];
     EXPECT_EQ(a.dwell, b.dwell);
     if (a.dwell >= plan.dwells.size()) {
-      // Between two places that are as good the last digits of the points around decide.
+      // The last digits of the points around decide between neighbours.
       EXPECT_NEAR(b.frequency_hz / a.frequency_hz, 1.0, 0.05);
       continue;
     }
@@ -113,7 +114,7 @@ TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Dwells, GoingOn, testing::Values(0U, 1U, 3U, 7U, 12U, 13U));
+INSTANTIATE_TEST_SUITE_P(Dwells, GoingOn, testing::Range(0U, 14U));
 
 TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   const SweepPlan plan = levelled_plan();
