@@ -36,4 +36,12 @@ std::string changed_include(const record::StoredRun& run, const config::Rig& rig
   return {};
 }
 
+void refuse_changed_include(const record::StoredRun& run, const config::Rig& rig,
+                            const std::string& sweep_file) {
+  const std::string changed = changed_include(run, rig);
+  if (changed.empty()) return;
+  throw config::ConfigError(changed + ": has changed since the run of " + sweep_file +
+                            " began; put it back to go on with that, or begin anew");
+}
+
 }  // namespace sinerig::cli

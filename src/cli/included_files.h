@@ -15,4 +15,8 @@ std::string included_text(const config::Rig& rig);
 // count as they are now.
 std::string changed_include(const record::StoredRun& run, const config::Rig& rig);
 
+// Throws config::ConfigError where one is not.
+void refuse_changed_include(const record::StoredRun& run, const config::Rig& rig,
+                            const std::string& sweep_file);
+
 }  // namespace sinerig::cli

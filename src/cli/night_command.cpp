@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 #include <spdlog/spdlog.h>
 
+#include "cli/included_files.h"
 #include "cli/night_folder.h"
 #include "cli/output_file.h"
 #include "cli/recorded_run.h"
@@ -59,7 +60,11 @@ class Night {
     for (const NightTask& task : tasks_) {
       const std::unique_ptr<ConfiguredRig> configured = configured_rig(task, drivers_);
       of_sweep(*task.sweep, [&] { return configured->rig().plan(); });
-      state_of(task);
+      if (state_of(task) != TaskState::not_begun) {
+        refuse_changed_include(record::read_sweep(task.sweep_file), configured->rig(),
+                               task.sweep_file);
+      }
+      included_[task.sweep_file] = included_text(configured->rig());
     }
   }
 
@@ -79,6 +84,7 @@ class Night {
   std::vector<NightTask> tasks_;
   ServiceNotifier service_;
   RunControl between_;                           // a stop, whenever it was asked for
+  std::map<std::string, std::string> included_;  // by sweep file: what its rig led to at first
   std::map<std::string, std::string> failures_;  // by sweep file: could not be run at all
 };
 
@@ -125,6 +131,11 @@ int Night::sweep(const NightTask& task, TaskState state) {
         drivers_);
   }
   const std::unique_ptr<ConfiguredRig> configured = configured_rig(task, drivers_);
+  if (included_text(configured->rig()) != included_[task.sweep_file]) {
+    throw config::ConfigError(task.sweep->rig +
+                              ": a file that it leads to (a profile, a DBC) has changed since the "
+                              "night began, and its repeats could not be compared; put it back");
+  }
   const SweepPlan plan = configured->rig().plan();
   return record_run(*configured, plan,
                     {.sweep_file = task.sweep_file,

@@ -104,7 +104,11 @@ std::optional<KnownModes> earlier_modes(const config::Rig& rig) {
   for (const Pair& pair : rig.runner.responses) {
     outputs.push_back(rig.sensors.at(pair.output - 1).name);
   }
-  return modes_of_file(rig.prior, outputs);
+  try {
+    return modes_of_file(rig.prior, outputs);
+  } catch (const record::SweepFileError& error) {
+    throw config::ConfigError(rig.file->name() + ": [sweep] prior: " + error.what());
+  }
 }
 
 // Whether points that an earlier part has modelled are left without the review that ends such a
@@ -117,14 +121,6 @@ bool without_review(const SweepPlan& plan, const SweepRunner& runner,
   };
   return plan.judgement.settling == Settling::model && finished.dwells == runner.dwells().size() &&
          std::any_of(finished.points.begin(), finished.points.end(), modelled);
-}
-
-void refuse_changed_include(const record::StoredRun& run, const config::Rig& rig,
-                            const std::string& sweep_file) {
-  const std::string changed = changed_include(run, rig);
-  if (changed.empty()) return;
-  throw config::ConfigError(changed + ": has changed since the run of " + sweep_file +
-                            " began; put it back to go on with that run, or begin a new one");
 }
 
 }  // namespace

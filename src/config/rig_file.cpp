@@ -144,7 +144,8 @@ std::vector<Section> RigFile::children(std::string_view parent) {
 }
 
 void RigFile::include(const std::string& path) {
-  included_[std::filesystem::absolute(path).lexically_normal().string()] = digest_of(path);
+  // One file has one name, by whatever link it is reached.
+  included_[std::filesystem::weakly_canonical(path).string()] = digest_of(path);
 }
 
 void RigFile::refuse_unread() const {

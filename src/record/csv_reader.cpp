@@ -19,7 +19,7 @@ StoredPoint point_of(const CsvTable& row) {
   StoredPoint point = imported_point();
   point.frequency_hz = row.frequency_hz();
   point.response = row.response();
-  if (row.has("std")) {
+  if (!row.text("std").empty()) {
     const double variance = row.number("std") * row.number("std");
     point.covariance = {variance, 0.0, variance};
   } else {

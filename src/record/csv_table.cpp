@@ -1,6 +1,5 @@
 #include "record/csv_table.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <limits>
@@ -26,12 +25,12 @@ bool CsvLines::next(std::string& line) {
   while (std::getline(stream_, line)) {
     if (++number_ == 1) drop_byte_order_mark(line);
     if (line.find('\0') != std::string::npos) refuse("holds binary data; wanted text");
-    // The quotes of a line are those of its fields.
-    const std::size_t content = line.find_first_not_of(" \t\r\f\v");
-    if (content == std::string::npos) continue;
-    line = as_utf8(line.substr(content));
-    if (line.front() != '#') return true;
-    remarks_.push_back(trimmed_field(line.substr(1)));
+    line = as_utf8(line);
+    // A spreadsheet puts a remark that holds a separator into quotes.
+    const std::string content = trimmed_field(line);
+    if (content.empty()) continue;
+    if (content.front() != '#') return true;
+    remarks_.push_back(trimmed_field(content.substr(1)));
   }
   return false;
 }
@@ -59,8 +58,7 @@ bool CsvTable::next() {
 void CsvTable::name_columns(const std::vector<std::string>& names, bool headed) {
   if (!headed && fields_.size() < 3)
     lines_.refuse("fewer than three columns; wanted freq_hz,re,im[,std], by commas");
-  for (std::size_t i = 0; i < std::min(names.size(), fields_.size()); ++i)
-    columns_.emplace(names[i], i);
+  for (std::size_t i = 0; i < names.size(); ++i) columns_.emplace(names[i], i);
   if (!has("freq_hz") && !has("omega_rad_s"))
     lines_.refuse(
         "the header has no column freq_hz (frequency in Hz) and none omega_rad_s (in rad/s); "

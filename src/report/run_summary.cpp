@@ -210,7 +210,9 @@ Json run_json(const LabelledRun& labelled) {
     if (key == "rig_text" || value.empty()) continue;
     std::string name = key;
     std::replace(name.begin(), name.end(), '_', ' ');
-    facts.push_back({name, value});
+    std::string text = value;
+    std::replace(text.begin(), text.end(), '\n', ';');
+    facts.push_back({name, text});
   }
   const std::vector<std::string> parts = part_texts(run);
   for (std::size_t i = 0; i < parts.size(); ++i)

@@ -10,7 +10,7 @@ namespace sinerig {
 
 namespace {
 
-// Checkpoints of a dwell: enough to drop a quarter of a short window, few enough to keep.
+// Checkpoints of a dwell: enough to drop an eighth of a short window, few enough to keep.
 constexpr std::size_t max_checkpoints = 65;
 
 // A dwell measured both ways disagrees: in sigma of both, and as a part of the target. At 4 one

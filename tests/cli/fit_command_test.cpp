@@ -119,6 +119,7 @@ TEST_F(FitCommand, RefusesWhatIsNoResponse) {
   refuses("1,1,0\n2,0,0\n3,1,0\n", "the response is exactly zero");
   refuses_file("1,1,0\n2,one,0\n", "response.csv:2: re is \"one\"; wanted a number");
   refuses_file("1,1\n", "fewer than three columns");
+  refuses("1,1,0\n2,0.9,-0.2,0.01\n3,0.8,-0.2,0.01\n", "given for every point or for none");
   refuses_file("0,5;0,2;-0,1\n1,5;0,2;-0,1\n",
                "response.csv:1: the numbers have decimal commas; write points");
   refuses_file("freq_hz;re;im\n0,5;0,2;-0,1\n", "response.csv:2: the numbers have decimal commas");

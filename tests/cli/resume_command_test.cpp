@@ -3,9 +3,12 @@
 
 #include <gmock/gmock.h>
 
+#include "cli/recorded_run.h"
+#include "drivers/can/can_driver.h"
 #include "record/database.h"
 #include "record/sweep_reader.h"
 #include "support/process.h"
+#include "support/rig_text.h"
 
 namespace sinerig {
 namespace {
@@ -123,6 +126,38 @@ TEST_F(Resume, GoesOnWithTheRigFileAsItWas) {
               HasSubstr("rig.toml has changed since the run began; the run goes on with the rig "
                         "file as it was"));
   EXPECT_EQ(record::read_sweep(path("run.sweep")).fact("rig_text"), rig("", "4"));
+}
+
+// What the rig file leads to is looked at before anything is opened: there is no bus here.
+TEST_F(Resume, RefusesAProfileOrDbcThatHasChanged) {
+  fs::copy(test::shipped("can-gimbal.toml"), folder_);
+  fs::copy(test::shipped("devices"), folder_ / "devices");
+  fs::create_directories(folder_ / "out");
+  const auto begin = [&](const std::string& name) {
+    const cli::ConfiguredRig rig{path("can-gimbal.toml"), {can::can_driver()}};
+    const SweepPlan plan = rig.rig().plan();
+    record::SweepWriter writer{path(name), cli::run_info(rig.rig(), plan),
+                               record::SweepWriter::IfExists::refuse};
+    writer.begin_part({});
+    writer.commit();
+  };
+  begin("can-gimbal.sweep");
+  begin("out/can-gimbal-1.sweep");
+  write("night.toml", "[night]\nfolder = \"out\"\n[[night.sweep]]\nrig = \"can-gimbal.toml\"\n");
+  EXPECT_THAT(run({"resume", "can-gimbal.sweep"}).err, Not(HasSubstr("has changed")));
+
+  const std::string dbc = "devices/odrive-cansimple.dbc";
+  write(dbc, read(dbc) + "\nCM_ \"edited\";\n");
+  const auto resumed = run({"resume", "can-gimbal.sweep"});
+  EXPECT_EQ(resumed.code, 2);
+  EXPECT_THAT(resumed.err, HasSubstr("odrive-cansimple.dbc: has changed since the run of "
+                                     "can-gimbal.sweep began; put it back to go on with that"));
+  const auto night = run({"night", "night.toml"});
+  EXPECT_EQ(night.code, 2);
+  EXPECT_THAT(night.err, HasSubstr("odrive-cansimple.dbc: has changed since the run of "
+                                   "out/can-gimbal-1.sweep began"));
+  EXPECT_THAT(run({"run", "--resume", "can-gimbal.toml"}).err,
+              HasSubstr("odrive-cansimple.dbc has changed since: a new sweep begins"));
 }
 
 TEST_F(Resume, MarksAKilledPart) {

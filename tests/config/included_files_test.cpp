@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <fstream>
+#include <unistd.h>
 
 #include <gmock/gmock.h>
 
@@ -18,11 +19,12 @@ namespace fs = std::filesystem;
 class IncludedFiles : public testing::Test {
  protected:
   IncludedFiles() {
-    fs::remove_all(folder_);
     fs::create_directories(folder_);
     fs::copy(test::shipped("can-gimbal.toml"), folder_);
     fs::copy(test::shipped("devices"), folder_ / "devices");
   }
+
+  ~IncludedFiles() override { fs::remove_all(folder_); }
 
   // As a run begins, and as one is taken up again.
   std::unique_ptr<ConfiguredRig> configured() const {
@@ -34,7 +36,8 @@ class IncludedFiles : public testing::Test {
     std::ofstream{folder_ / name, std::ios::app} << text;
   }
 
-  const fs::path folder_ = fs::path{testing::TempDir()} / "included-files";
+  const fs::path folder_ =
+      fs::path{testing::TempDir()} / ("included-files-" + std::to_string(getpid()));
 };
 
 TEST_F(IncludedFiles, AreTheProfileAndItsDbc) {
@@ -56,6 +59,15 @@ TEST_F(IncludedFiles, TellWhichHasChangedSinceTheRunBegan) {
   run.facts = {{"included", included_text(configured()->rig())}};
   append("devices/odrive.toml", "# edited\n");
   EXPECT_THAT(changed_include(run, configured()->rig()), testing::EndsWith("odrive.toml"));
+}
+
+TEST_F(IncludedFiles, AreTheSameByWhateverLink) {
+  record::StoredRun run;
+  run.facts = {{"included", included_text(configured()->rig())}};
+  fs::create_directory_symlink(folder_, folder_ / "link");
+  const ConfiguredRig linked{(folder_ / "link/can-gimbal.toml").string(),
+                             std::vector{can::can_driver()}};
+  EXPECT_EQ(changed_include(run, linked.rig()), "");
 }
 
 TEST_F(IncludedFiles, OfAFileThatDoesNotSayAreTakenAsTheyAre) {

@@ -162,7 +162,8 @@ CommandSettings command() {
 void drive_on(Link& link, ModbusActuator& actuator, int exchanges) {
   for (int n = 0; n < exchanges; ++n) {
     actuator.write(1.0 + n);
-    while (!link.fresh() || link.overrun()) {
+    for (int turn = 0; !link.fresh() || link.overrun(); ++turn) {
+      ASSERT_LT(turn, 100'000'000) << link.last_failure();
       std::this_thread::yield();
       actuator.write(1.0 + n);
     }

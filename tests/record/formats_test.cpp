@@ -304,6 +304,16 @@ TEST_F(Formats, ReadsPlainCsv) {
   EXPECT_EQ(plain[0].points[0].status, "imported");
 }
 
+TEST_F(Formats, ReadsCsvAsASpreadsheetQuotesIt) {
+  workshop_.write(
+      "q.csv", "\"# by hand, in a hurry\"\n\"# output: gyro [rad/s]\"\n1,1,0\n\"\"\n2,1,0,0.1\n");
+  const auto quoted = import_responses(path("q.csv"));
+  ASSERT_EQ(quoted[0].points.size(), 2U);
+  EXPECT_EQ(quoted[0].output.name, "gyro");
+  EXPECT_EQ(quoted[0].points[0].dof, 0.0);
+  EXPECT_DOUBLE_EQ(quoted[0].points[1].covariance.re_re, 0.01);
+}
+
 TEST_F(Formats, ReadsPolarCsvInRadPerSecond) {
   workshop_.write("p.csv", "# by hand\nomega_rad_s;gain_db;phase_deg\n6.283185307179586;20;-90\n");
   const auto polar = import_responses(path("p.csv"));
