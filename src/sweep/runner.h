@@ -89,7 +89,11 @@ class SweepRunner {
   void repeat_dwell() noexcept;
   void tell_trip(EventKind kind) noexcept;
   void teach_refiner(const Point& point) noexcept SINERIG_NONBLOCKING;
+  const Dwell& next_to_measure() const noexcept SINERIG_NONBLOCKING;
+  // What is under way has measured nothing of the dwell that it is filed under.
+  bool preflight_elsewhere() const noexcept { return preflight_ && dwell_ > 0; }
   void finish_dwell() noexcept;
+  void put_points() noexcept;
   void next_dwell() noexcept;
   void account_usage() noexcept SINERIG_NONBLOCKING;
   void refine() noexcept;

@@ -63,9 +63,9 @@ bool SweepRunner::pause(std::uint64_t ticks) noexcept {
     announce({.kind = EventKind::retried,
               .dwell = dwell_,
               .tick = last_tick_,
-              .value = scale_ * dwells_[dwell_]->tones.front().amplitude});
+              .value = scale_ * next_to_measure().tones.front().amplitude});
     repeat_dwell();
-  } else if (recovery_.soft_all_spent()) {
+  } else if (recovery_.soft_all_spent() || preflight_) {
     trip_told_ = no_tick;  // as the end of a dwell; now as that of the sweep
     return false;
   } else {
@@ -150,14 +150,14 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
 }
 
 void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
-  const Dwell& dwell = *dwells_[dwell_];
+  const Dwell& dwell = next_to_measure();
   if (!scale_chosen_) {
     scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
     if (preflight_) scale_ = std::min(scale_, settings_.preflight.level);
   }
   const bool from_rest = excitation_.resting();
   excitation_.start(dwell, scale_);
-  if (remeasuring_ && trust_.condemned(dwell_)) {
+  if (remeasuring_ && !preflight_ && trust_.condemned(dwell_)) {
     trust_.acquit(dwell_);
     announce({.kind = EventKind::remeasured, .dwell = dwell_, .tick = tick});
   }
@@ -166,9 +166,15 @@ void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
   announce({.kind = EventKind::dwell_began, .dwell = dwell_, .tick = tick});
 }
 
+// The pre-flight is of the first dwell, whichever the sweep goes on with: what gain and phase are
+// to be is known of that one.
+const Dwell& SweepRunner::next_to_measure() const noexcept {
+  return preflight_ ? *dwells_.front() : *dwells_[dwell_];
+}
+
 void SweepRunner::conclude_dwell() noexcept {
   run_.conclude();
-  run_.put_lessons();
+  if (!preflight_elsewhere()) run_.put_lessons();
   if (preflight_) {
     if (!pass_preflight()) return;
     preflight_ = false;
@@ -267,6 +273,14 @@ void SweepRunner::teach_refiner(const Point& point) noexcept {
 }
 
 void SweepRunner::finish_dwell() noexcept {
+  if (!preflight_elsewhere()) put_points();
+  account_usage();
+  sink_.put(run_.timing());
+  outcome_.skipped_ticks += run_.timing().skipped;
+  run_.end();
+}
+
+void SweepRunner::put_points() noexcept {
   const Dwell& dwell = *dwells_[dwell_];
   for (std::size_t tone = 0; tone < dwell.tones.size(); ++tone) {
     refiner_.add(dwell.tone_hz(dwell.tones[tone], plan_.rate_hz));
@@ -278,10 +292,6 @@ void SweepRunner::finish_dwell() noexcept {
     }
     refiner_.learn();
   }
-  account_usage();
-  sink_.put(run_.timing());
-  outcome_.skipped_ticks += run_.timing().skipped;
-  run_.end();
 }
 
 // The loop's one system call of its own besides the sleep: once a dwell, in its last tick, when the

@@ -37,14 +37,15 @@ struct Measured {
   std::size_t dwells = 0;
 };
 
-Measured run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells& finished) {
+Measured run_from(const SweepPlan& plan, double noise_rms, const FinishedDwells& finished,
+                  const RunnerSettings& how = {}) {
   Measured run;
   VirtualClock clock{TickGrid{plan.rate_hz}};
   const sim::SimulatedRigSettings settings = resonant_rig(noise_rms);
   sim::SimulatedRig rig{settings, clock};
   Sensor* const sensors[] = {&rig.sensor(0)};
   Guard guard{test::open_guard(1), clock.grid().period_s()};
-  SweepRunner runner{plan, {}, clock, rig.actuator(), sensors, guard, run.sink};
+  SweepRunner runner{plan, how, clock, rig.actuator(), sensors, guard, run.sink};
   run.to_measure = runner.go_on(finished);
   RunControl control;
   if (run.to_measure) run.outcome = runner.run(control);
@@ -115,6 +116,30 @@ TEST_P(GoingOn, MeasuresTheRestAtTheSameLevelsAndPlaces) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Dwells, GoingOn, testing::Range(0U, 14U));
+
+// What its gain and phase are to be is known of the first dwell, of no other.
+TEST(RestOfASweep, HasThePreflightOfTheFirstDwell) {
+  const SweepPlan plan = levelled_plan();
+  const Measured whole = run_from(plan, 0.0, {});
+  RunnerSettings how;
+  how.preflight = {.wanted = true, .min_phase_deg = -20.0, .max_phase_deg = 5.0};
+  for (const std::uint32_t kept : {3U, 8U, 11U}) {
+    const Measured rest = run_from(plan, 0.0, first_of(whole, kept), how);
+    EXPECT_FALSE(rest.outcome.trip.tripped()) << kept;
+    ASSERT_EQ(rest.sink.preflights.size(), 1U);
+    EXPECT_EQ(rest.sink.preflights[0].frequency_hz, whole.sink.points[0].frequency_hz);
+    ASSERT_EQ(rest.sink.points.size(), whole.sink.points.size() - kept);
+    EXPECT_EQ(rest.sink.points[0].dwell, kept);
+    EXPECT_EQ(rest.sink.points[0].frequency_hz, whole.sink.points[kept].frequency_hz);
+    EXPECT_NEAR(std::abs(rest.sink.points[0].response / whole.sink.points[kept].response - 1.0),
+                0.0, 6e-3);
+  }
+  // One that fails has measured nothing of the dwell that comes.
+  how.preflight.max_gain = 1e-3;
+  const Measured failed = run_from(plan, 0.0, first_of(whole, 8), how);
+  EXPECT_EQ(failed.outcome.trip.cause, TripCause::preflight_gain);
+  EXPECT_TRUE(failed.sink.points.empty());
+}
 
 TEST(RestOfASweep, BeginsWithExactlyWhatWasLearnt) {
   const SweepPlan plan = levelled_plan();
