@@ -123,6 +123,13 @@ bool without_review(const SweepPlan& plan, const SweepRunner& runner,
          std::any_of(finished.points.begin(), finished.points.end(), modelled);
 }
 
+void warn_of_empty_preflight(const PreflightSettings& preflight) {
+  if (!preflight.wanted || preflight.knows_gain() || preflight.knows_sign()) return;
+  spdlog::warn(
+      "[sweep] preflight: without preflight_gain and preflight_phase_deg it looks at the noise "
+      "alone; a wrong sign or unit passes");
+}
+
 }  // namespace
 
 record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan) {
@@ -141,6 +148,7 @@ record::RunInfo run_info(const config::Rig& rig, const SweepPlan& plan) {
 int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedRunOptions& options,
                const OpenSweepFile& open_file, const record::UnfinishedRun* earlier) {
   const config::Rig& rig = configured.rig();
+  warn_of_empty_preflight(rig.runner.preflight);
   if (earlier != nullptr) refuse_changed_include(earlier->stored, rig, options.sweep_file);
   Clock& clock = configured.clock();
   RunControl& control = configured.control();

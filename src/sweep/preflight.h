@@ -22,6 +22,9 @@ struct PreflightSettings {
   double min_phase_deg = -180.0;  // …to max_phase_deg, counted upwards; a full turn: any
   double max_phase_deg = 180.0;
   double min_snr_db = -10.0;  // of every response: tone over residual, per sample
+
+  bool knows_gain() const noexcept { return min_gain > 0.0 || max_gain < 1e300; }
+  bool knows_sign() const noexcept { return max_phase_deg - min_phase_deg < 360.0; }
 };
 
 // What it found of one response.

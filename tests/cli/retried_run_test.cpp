@@ -12,6 +12,7 @@ namespace {
 
 using testing::Contains;
 using testing::HasSubstr;
+using testing::Not;
 
 class RetriedRun : public test::ProgramTest {
  protected:
@@ -88,6 +89,10 @@ TEST_F(RetriedRun, TellsOfItsPreflightAndStopsBeforeTheSweepWhereItFails) {
   const auto passed = run({"run", "rig.toml", "--no-report"});
   EXPECT_EQ(passed.code, 0) << passed.err;
   EXPECT_THAT(passed.out, HasSubstr("preflight: passed: y/applied at 5 Hz, 0.05: gain 0.88"));
+  EXPECT_THAT(passed.err, Not(HasSubstr("a wrong sign or unit passes")));
+  write("rig.toml", rig("preflight = true", "", ""));
+  EXPECT_THAT(run({"run", "rig.toml", "--no-report", "--force", "-o", "rig.sweep"}).err,
+              HasSubstr("a wrong sign or unit passes"));
 
   write("rig.toml", rig("preflight = true\npreflight_phase_deg = [90, 270]", "", ""));
   const auto failed = run({"run", "rig.toml", "--no-report", "--force", "-o", "rig.sweep"});

@@ -78,7 +78,11 @@ inline RealRun run_in_real_time(MarkingClock& clock, Actuator& inner,
   Guard guard{guard_settings, clock.grid().period_s()};
   Outbox outbox{1U << 14U, 1U << 12U, Outbox::WhenFull::keep};
   SweepRunner runner{plan_sweep(sweep, {}, clock.grid().rate_hz()),
-                     {.responses = {}, .readbacks = {}, .record_samples = true, .max_gap_s = 60.0},
+                     {.responses = {},
+                      .readbacks = {},
+                      .record_samples = true,
+                      .max_gap_s = 60.0,
+                      .real_time = true},
                      clock,
                      actuator,
                      sensors,

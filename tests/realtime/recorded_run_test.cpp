@@ -1,6 +1,8 @@
 // The loop on its thread, the recorder on another, the queue between them: what is in the file is
 // what the loop measured. Under the preset `tsan` the thread sanitizer watches.
+#include <complex>
 #include <filesystem>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -34,14 +36,18 @@ sim::SimulatedRigSettings axis() {
   return settings;
 }
 
+RunnerSettings usual_settings() {
+  return {.responses = {}, .readbacks = {}, .record_samples = true, .max_gap_s = 60.0};
+}
+
 record::StoredRun record_run(realtime::LoopThread& thread, Clock& clock, Outbox::WhenFull when_full,
-                             std::size_t capacity) {
+                             std::size_t capacity, const SweepPlan& plan = short_plan(),
+                             const RunnerSettings& settings = usual_settings()) {
   const fs::path path =
       fs::path{testing::TempDir()} /
       (std::string{testing::UnitTest::GetInstance()->current_test_info()->name()} + ".sweep");
   fs::remove(path);
   {
-    const SweepPlan plan = short_plan();
     record::RunInfo info{
         .rig_name = "rig.toml", .rig_text = "", .clock = "", .channels = {}, .plan = plan};
     info.channels = {{"command", "1"}, {"applied", "1"}, {"y", "1"}};
@@ -50,11 +56,7 @@ record::StoredRun record_run(realtime::LoopThread& thread, Clock& clock, Outbox:
     Sensor* const sensors[] = {&rig.sensor(0)};
     Guard guard{test::open_guard(1), clock.grid().period_s()};
     Outbox outbox{capacity, 1U << 12U, when_full};
-    SweepRunner runner{
-        plan,    {.responses = {}, .readbacks = {}, .record_samples = true, .max_gap_s = 60.0},
-        clock,   rig.actuator(),
-        sensors, guard,
-        outbox};
+    SweepRunner runner{plan, settings, clock, rig.actuator(), sensors, guard, outbox};
     RunControl control;
     std::atomic<std::size_t> observed{0};
     record::Recorder recorder{outbox, writer, [&](const Record&) {
@@ -96,6 +98,42 @@ TEST(RecordedRun, InRealTimeHoldsEveryPoint) {
   EXPECT_EQ(run.responses[0].points.size(), 3U);
   EXPECT_EQ(run.timings.size(), 3U);
   EXPECT_TRUE(run.usage());
+}
+
+// The pole of axis(), known to a tenth.
+KnownModes mode_of_the_axis() {
+  KnownModes modes;
+  modes.prior.modes = 1;
+  modes.prior.poles[0] = {.sigma_rad_s = -10.0};
+  modes.prior.covariance[0] = 1.0;
+  modes.noise_variance = {1e-6};
+  modes.noise_dof = 100.0;
+  return modes;
+}
+
+// The loop goes on while a thread of its own solves for the modes of a dwell.
+TEST(RecordedRun, InRealTimeModelsTransientsOnAnotherThread) {
+  SweepSettings sweep;
+  sweep.spacing = Spacing::list;
+  sweep.frequencies_hz = {10.0, 20.0, 40.0};
+  sweep.amplitude = 0.5;
+  sweep.settling = Settling::model;
+  RunnerSettings settings = usual_settings();
+  settings.real_time = true;
+  settings.modes = mode_of_the_axis();
+  MonotonicClock clock{TickGrid{1000.0}};
+  realtime::LoopThread thread{realtime::Settings{}};
+  const record::StoredRun run = record_run(thread, clock, Outbox::WhenFull::keep, 1U << 14U,
+                                           plan_sweep(sweep, {}, 1000.0), settings);
+  ASSERT_EQ(run.responses.size(), 1U);
+  ASSERT_EQ(run.responses[0].points.size(), 3U);
+  int modelled = 0;
+  for (const record::StoredPoint& point : run.responses[0].points) {
+    const std::complex<double> s{0.0, 2.0 * std::numbers::pi * point.frequency_hz};
+    EXPECT_NEAR(std::abs(point.response) / std::abs(10.0 / (s + 10.0)), 1.0, 0.05);
+    modelled += point.settled_by == "model" ? 1 : 0;
+  }
+  EXPECT_GT(modelled, 0);
 }
 
 }  // namespace
