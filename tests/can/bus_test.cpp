@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <functional>
 #include <limits>
 #include <net/if.h>
@@ -234,6 +235,33 @@ TEST_F(CanBus, ASampleIsAsOldAsItsFrameNotAsItsReading) {
   const Sample sample = sensor.read();
   EXPECT_GE(sample.time_ns, before_ns);
   EXPECT_LE(sample.time_ns, after_ns);
+}
+
+// NTP that finds the clock an hour off sets it at once.
+TEST_F(CanBus, ASampleIsNoOlderWhenTheWallClockIsSet) {
+  const auto set_by = [](std::int64_t seconds) {
+    timespec time{};
+    clock_gettime(CLOCK_REALTIME, &time);
+    time.tv_sec += seconds;
+    return clock_settime(CLOCK_REALTIME, &time) == 0;
+  };
+  Peer peer;
+  Bus bus("vcan0", false);
+  CanSensor sensor(bus, position_feedback());
+  bus.start();
+  for (const std::int64_t step_s : {3600, -3600}) {
+    const std::int64_t before_ns = monotonic_ns();
+    peer.send(float_frame(feedback_id, 1.0));
+    ASSERT_TRUE(set_by(step_s));
+    EXPECT_GE(sensor.read().time_ns, before_ns);
+    EXPECT_EQ(sensor.read().fault, Fault::stale);
+    peer.send(float_frame(feedback_id, 2.0));
+    const std::int64_t after_ns = monotonic_ns();
+    usleep(5000);
+    const Sample next = sensor.read();
+    EXPECT_GE(next.time_ns, before_ns);
+    EXPECT_LE(next.time_ns, after_ns) << "stamped by the clock as it is now";
+  }
 }
 
 TEST_F(CanBus, OnlyMatchingFramesCount) {
