@@ -108,6 +108,47 @@ TEST(CanProfile, RmdTorqueReplyIsToldApartByItsCommandByte) {
   EXPECT_NEAR(value_of(angle, {0x92, 0, 0, 0, 0xA0, 0x8C, 0, 0}), 6.283185307179586, 1e-12);
 }
 
+TEST(CanProfile, RmdAnswersSpeedAsItAnswersCurrent) {
+  const Profile rmd("myactuator-rmd.toml", 1);
+  const FeedbackSettings velocity = rmd.feedback("velocity");
+  const FeedbackSettings current = rmd.feedback("current");
+  for (const std::uint8_t command :
+       {rmd.command("current").frame.data[0], rmd.command("velocity").frame.data[0]}) {
+    const Bytes answer{command, 0x1E, 0x64, 0x00, 0xB4, 0x00, 0x2D, 0x00};
+    EXPECT_NEAR(value_of(velocity, answer), 3.141592653589793, 1e-12);
+    EXPECT_NEAR(value_of(current, answer), 1.0, 1e-12);
+  }
+  Frame other;
+  other.id = velocity.pattern.id;
+  other.length = 8;
+  for (const std::uint8_t first : Bytes{0x92, 0x9A, 0x9C, 0xA4, 0x81}) {
+    other.data[0] = first;
+    EXPECT_FALSE(velocity.pattern.matches(other)) << int{first};
+  }
+}
+
+TEST(CanProfile, RmdIsAskedForItsErrors) {
+  for (const char* name : {"current", "velocity"}) {
+    const CommandSettings command = Profile("myactuator-rmd.toml", 1).command(name);
+    ASSERT_EQ(command.keep_alive.size(), 1u);
+    EXPECT_EQ(bytes_of(command.keep_alive[0].frame), (Bytes{0x9A, 0, 0, 0, 0, 0, 0, 0}));
+    EXPECT_EQ(command.keep_alive[0].frame.id, 0x141u);
+    EXPECT_EQ(command.keep_alive[0].period_ns, 100'000'000);
+    ASSERT_EQ(command.health.size(), 1u);
+    const HealthRule& rule = command.health[0];
+    EXPECT_EQ(rule.value, 0.0);
+    EXPECT_GT(rule.max_age_ns, command.keep_alive[0].period_ns);
+    Frame status;
+    status.id = 0x241;
+    status.length = 8;
+    status.data = {0x9A, 0x32, 0, 1, 0xE5, 0x01, 0x04, 0x10};  // 48.5 V; low voltage, too hot
+    EXPECT_TRUE(rule.pattern.matches(status));
+    EXPECT_EQ(decode(status.payload(), rule.signal), 0x1004);
+    status.data[0] = 0xA1;
+    EXPECT_FALSE(rule.pattern.matches(status));
+  }
+}
+
 TEST(CanProfile, Gm6020IsBigEndianAndWraps) {
   const Profile gm("dji-gm6020.toml", 2);
   const CommandSettings current = gm.command("current");
