@@ -124,7 +124,7 @@ class CanDevice final : public Device {
       remarks.push_back({.text = text});
       if (bus->state() != BusState::up)
         remarks.push_back(
-            {.text = bus->interface() + ": " + to_string(bus->state()), .stops_a_sweep = true});
+            {.text = describe(bus->interface(), bus->state()), .stops_a_sweep = true});
     }
     return remarks;
   }

@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <net/if.h>
 #include <poll.h>
 #include <unistd.h>
@@ -39,6 +40,20 @@ ifreq request_for(const std::string& interface) noexcept {
 
 std::int64_t nanoseconds(const timespec& time) noexcept {
   return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+}
+
+// In bus-off the kernel takes frames, says that they are sent, and drops them: only the carrier
+// tells. A controller that restarts by itself is given the time for it.
+bool has_carrier(int fd, const std::string& interface) noexcept {
+  constexpr int tries = 30;
+  constexpr timespec between{0, 10'000'000};
+  for (int n = 0; n < tries; ++n) {
+    ifreq request = request_for(interface);
+    if (ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_RUNNING) != 0)
+      return true;
+    nanosleep(&between, nullptr);
+  }
+  return false;
 }
 
 bool bind_to(int fd, const std::string& interface) noexcept {
@@ -89,6 +104,13 @@ Socket::Socket(const std::string& interface, bool fd_frames)
         (request.ifr_mtu != classic_mtu && request.ifr_mtu != fd_mtu)) {
       errno = EPROTOTYPE;
       refuse("interface " + interface + " is no CAN interface");
+    }
+    if (!has_carrier(fd_, interface)) {
+      errno = ENETDOWN;
+      refuse("CAN interface " + interface +
+             " is up but has no carrier: its controller is bus-off? `ip -details link show " +
+             interface + "` tells; `ip link set " + interface + " down`, then `ip link set " +
+             interface + " up type can restart-ms 100` starts it again, and after every bus-off");
     }
     if (fd_frames && request.ifr_mtu != fd_mtu) {
       errno = EMSGSIZE;

@@ -380,7 +380,9 @@ TEST_F(CanBus, NothingIsSentWhileBusOffAndAllIsWellAfterTheRestart) {
   Peer::inject_error(CAN_ERR_BUSOFF);
   EXPECT_EQ(actuator.write(2.0).fault, Fault::bus);
   EXPECT_EQ(sensor.read().fault, Fault::bus);
-  EXPECT_THAT(actuator.reason(), HasSubstr("bus-off"));
+  EXPECT_EQ(actuator.reason(),
+            "vcan0: bus-off; a controller with restart-ms 0, the default, stays off: `ip link set "
+            "vcan0 down`, then `… up type can restart-ms 100`");
   EXPECT_EQ(actuator.write(3.0).value, 1.0);
   EXPECT_EQ(bus.counters().bus_offs, 1u);
   EXPECT_EQ(bus.counters().dropped_dead, 2u);
@@ -931,6 +933,19 @@ TEST_F(CanBus, OpeningSaysWhatIsMissingAndWhatToDo) {
   shell("ip link set vcan0 mtu 16 && ip link set vcan0 up");
   EXPECT_THAT(refusal_of([] { Bus bus("vcan0", true); }),
               HasSubstr("carries classic frames only, the rig sends CAN-FD"));
+}
+
+// As that of a controller in bus-off is; here because the other end of the wire is down.
+TEST_F(CanBus, AnInterfaceWithoutACarrierIsRefused) {
+  std::system("ip link del can8 2>/dev/null");
+  shell("ip link add can8 type vxcan peer name can9 && ip link set can8 up");
+  EXPECT_THAT(refusal_of([] { Bus bus("can8", false); }),
+              HasSubstr("can8 is up but has no carrier: its controller is bus-off? `ip -details "
+                        "link show can8` tells; `ip link set can8 down`, then `ip link set can8 up "
+                        "type can restart-ms 100` starts it again, and after every bus-off"));
+  shell("ip link set can9 up");
+  EXPECT_EQ(refusal_of([] { Bus bus("can8", false); }), "");
+  shell("ip link del can8");
 }
 
 }  // namespace
