@@ -112,7 +112,8 @@ class GpioDevice final : public Device {
 DriverKit gpio_driver(std::function<std::unique_ptr<LineBank>()> bank) {
   return {.name = "gpio",
           .summary = "GPIO lines: density, sign-magnitude or step outputs; encoders, interlocks",
-          .configure = [bank](const DeviceRequest& request) -> std::unique_ptr<Device> {
+          .configure =
+              [bank = std::move(bank)](const DeviceRequest& request) -> std::unique_ptr<Device> {
             return std::make_unique<GpioDevice>(request, bank);
           }};
 }
