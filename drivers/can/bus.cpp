@@ -14,6 +14,14 @@ const char* to_string(BusState state) noexcept {
   return "unknown";
 }
 
+std::string describe(const std::string& interface, BusState state) {
+  std::string text = interface + ": " + to_string(state);
+  if (state == BusState::bus_off)
+    text += "; a controller with restart-ms 0, the default, stays off: `ip link set " + interface +
+            " down`, then `… up type can restart-ms 100`";
+  return text;
+}
+
 std::size_t Bus::listen(const Pattern& pattern, const Checksum& checksum) {
   Slot slot;
   slot.pattern = pattern;

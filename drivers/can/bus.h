@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "drivers/can/frame_pattern.h"
@@ -17,6 +18,9 @@ namespace sinerig::can {
 enum class BusState : std::uint8_t { up, bus_off, link_down, gone };
 
 const char* to_string(BusState state) noexcept;
+
+// For people: of which interface, and what to do about it.
+std::string describe(const std::string& interface, BusState state);
 
 struct BusCounters {
   std::uint64_t sent = 0;

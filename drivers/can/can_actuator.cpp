@@ -153,7 +153,7 @@ std::string CanActuator::reason() const {
     case SendResult::sent: return "";
     case SendResult::queue_full:
       return bus_.interface() + ": the transmit queue is full, the command was dropped";
-    default: return bus_.interface() + ": " + to_string(last_state_);
+    default: return describe(bus_.interface(), last_state_);
   }
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "drivers/can/dbc.h"
 #include "drivers/can/health.h"
 #include "drivers/can/sequence.h"
 #include "drivers/driver.h"
@@ -21,6 +22,7 @@ struct CommandSettings {
   Frame frame;                    // constant bytes and signals are in it already
   std::optional<Frame> released;  // carries neutral to a device that is to be off; none: `frame`
   Signal signal;
+  std::optional<DbcOrigin> origin;  // of the signal
   Checksum checksum;
   double neutral = 0.0;
   Sequence startup;   // when the rig is opened: nothing may move

@@ -188,6 +188,7 @@ ConfigReader::Place ConfigReader::place_by_name(const Keys& keys) {
   Place place;
   place.frame = frame_of_message(keys, *binding.message);
   place.signal = binding.signal->signal;
+  place.origin = origin_of(binding);
   for (const auto& [multiplexor, raw] : binding.multiplexors) {
     place.pattern.require(multiplexor->signal, raw);
     insert_raw(place.frame.payload(), multiplexor->signal, raw);

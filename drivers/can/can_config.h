@@ -39,6 +39,7 @@ class ConfigReader {
     Frame frame;
     Pattern pattern;
     Signal signal;
+    std::optional<DbcOrigin> origin;
   };
 
   Place place(const Keys& keys);

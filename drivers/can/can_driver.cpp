@@ -33,6 +33,19 @@ struct Profile {
   }
 };
 
+// What a channel's bits were taken for: whoever knows the device sees what is wrong.
+void tell_signal(const std::string& channel, std::uint32_t id, bool extended, const Signal& signal,
+                 const std::optional<DbcOrigin>& origin, std::vector<Remark>& remarks) {
+  const std::string name = origin ? origin->name + ", " : "";
+  remarks.push_back(
+      {.text = channel + ": " + name + "frame " + id_text(id, extended) + ", " + describe(signal)});
+  if (origin && origin->perhaps_float)
+    remarks.push_back({.text = channel + ": " + origin->name +
+                               " is a 32-bit integer with scale 1 in the DBC file; if the device "
+                               "sends a float there, its SIG_VALTYPE_ is missing",
+                       .doubts = true});
+}
+
 std::string folder_of(const std::string& path) {
   return std::filesystem::path(path).parent_path().string();
 }
@@ -43,6 +56,7 @@ class CanDevice final : public Device {
       : rig_folder_{folder_of(request.rig.file->name())} {
     if (request.actuator != nullptr) {
       const Section& section = request.actuator->section;
+      check_rate(section, request.rig.rate_hz);
       command_ =
           read<CommandSettings>(section, "command", [&](ConfigReader& reader, const Keys& keys) {
             return reader.command(keys, request.rig.guard.neutral);
@@ -51,6 +65,7 @@ class CanDevice final : public Device {
     }
     for (const config::Channel* sensor : request.sensors) {
       Feedback feedback;
+      feedback.name = sensor->name;
       feedback.settings = read<FeedbackSettings>(
           sensor->section, "feedback",
           [](ConfigReader& reader, const Keys& keys) { return reader.feedback(keys); });
@@ -124,7 +139,15 @@ class CanDevice final : public Device {
       remarks.push_back({.text = text});
       if (bus->state() != BusState::up)
         remarks.push_back(
-            {.text = bus->interface() + ": " + to_string(bus->state()), .stops_a_sweep = true});
+            {.text = describe(bus->interface(), bus->state()), .stops_a_sweep = true});
+    }
+    if (command_)
+      tell_signal("command", command_->frame.id, command_->frame.extended, command_->signal,
+                  command_->origin, remarks);
+    for (const Feedback& feedback : feedback_) {
+      const FeedbackSettings& settings = feedback.settings;
+      tell_signal(feedback.name, settings.pattern.id, settings.pattern.extended, settings.signal,
+                  settings.origin, remarks);
     }
     return remarks;
   }
@@ -135,6 +158,7 @@ class CanDevice final : public Device {
     bool fd = false;
   };
   struct Feedback {
+    std::string name;
     FeedbackSettings settings;
     std::size_t interface = 0;
   };
@@ -160,6 +184,23 @@ class CanDevice final : public Device {
     }
     interfaces_.push_back({name, fd});
     return interfaces_.size() - 1;
+  }
+
+  // The start-up list of a profile may tell the drive the period of its set-points. A rig file that
+  // has it told another one says so by the same key.
+  void check_rate(const Section& section, double loop_hz) {
+    if (!section.has("profile")) return;
+    const Profile& profile = profile_at(section);
+    const Keys keys{section, rig_folder_, profile.file->section("device"), profile.folder};
+    if (!keys.has("rate_hz")) return;
+    if (keys.at("rate_hz").number("rate_hz", config::above_zero) == loop_hz) return;
+    char text[320];
+    std::snprintf(text, sizeof text,
+                  "is what the start-up list sets the drive up for, and [loop] rate_hz is %g: give "
+                  "the loop this rate, or add the steps that set up another one to "
+                  "[[actuator.startup]] and rate_hz = %g to [actuator]",
+                  loop_hz, loop_hz);
+    keys.refuse("rate_hz", text);
   }
 
   // Reads one channel: from the rig file alone, or laid over [command.NAME] of its profile.
@@ -192,6 +233,7 @@ class CanDevice final : public Device {
     const Section device = profile.file->section("device");
     device.text("name");
     device.text("source");
+    if (device.has("rate_hz")) device.number("rate_hz", config::above_zero);
     ConfigReader reader{Keys{device, profile.folder}, 0};
     for (const Section& command : profile.file->children("command")) {
       command.text("unit");

@@ -199,6 +199,7 @@ CommandSettings ConfigReader::command(const Keys& keys, std::optional<double> ne
   settings.frame = found.frame;
   fill(keys, settings.frame, by_name);
   settings.signal = found.signal;
+  settings.origin = found.origin;
   at_key(keys, where, [&] {
     check(settings.frame);
     check(settings.signal, settings.frame.length);
@@ -221,6 +222,7 @@ FeedbackSettings ConfigReader::feedback(const Keys& keys) {
   const Place found = place(keys);
   FeedbackSettings settings;
   settings.signal = found.signal;
+  settings.origin = found.origin;
   settings.pattern = found.pattern;
   settings.pattern.id_mask =
       static_cast<std::uint32_t>(keys.integer("id_mask", an_id, max_extended_id));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "drivers/can/bus.h"
+#include "drivers/can/dbc.h"
 #include "drivers/driver.h"
 
 namespace sinerig::can {
@@ -14,6 +15,7 @@ struct FeedbackSettings {
   Pattern pattern;
   Checksum checksum;
   Signal signal;
+  std::optional<DbcOrigin> origin;           // of the signal
   std::optional<std::uint64_t> invalid_raw;  // the code that means "no value"
   std::int64_t timeout_ns = 0;               // silence longer than this is a time-out; 0 = never
   bool fd = false;                           // comes as a CAN-FD frame

@@ -46,6 +46,14 @@ const DbcSignal* DbcMessage::find(std::string_view signal_name) const noexcept {
   return nullptr;
 }
 
+DbcOrigin origin_of(const DbcBinding& binding) {
+  const Signal& signal = binding.signal->signal;
+  const bool is_integer =
+      signal.encoding == Encoding::unsigned_integer || signal.encoding == Encoding::signed_integer;
+  return {.name = binding.message->name + "." + binding.signal->name,
+          .perhaps_float = is_integer && signal.length == 32 && signal.scale == 1.0};
+}
+
 Dbc Dbc::read_file(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
   std::ostringstream text;

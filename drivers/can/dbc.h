@@ -42,6 +42,15 @@ struct DbcBinding {
   std::vector<std::pair<const DbcSignal*, std::uint64_t>> multiplexors;  // and what each must be
 };
 
+// Which one a channel is bound to, for people.
+struct DbcOrigin {
+  std::string name;            // Message.Signal, the message's whole name
+  bool perhaps_float = false;  // 32 bits of an integer, not scaled: DBC files often leave out the
+                               // SIG_VALTYPE_ that makes them a float
+};
+
+DbcOrigin origin_of(const DbcBinding& binding);
+
 class Dbc {
  public:
   // Both throw std::runtime_error "FILE:LINE: what, value, rule".

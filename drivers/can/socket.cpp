@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 #include <net/if.h>
 #include <poll.h>
 #include <unistd.h>
@@ -41,6 +42,20 @@ std::int64_t nanoseconds(const timespec& time) noexcept {
   return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
 }
 
+// In bus-off the kernel takes frames, says that they are sent, and drops them: only the carrier
+// tells. A controller that restarts by itself is given the time for it.
+bool has_carrier(int fd, const std::string& interface) noexcept {
+  constexpr int tries = 30;
+  constexpr timespec between{0, 10'000'000};
+  for (int n = 0; n < tries; ++n) {
+    ifreq request = request_for(interface);
+    if (ioctl(fd, SIOCGIFFLAGS, &request) == 0 && (request.ifr_flags & IFF_RUNNING) != 0)
+      return true;
+    nanosleep(&between, nullptr);
+  }
+  return false;
+}
+
 bool bind_to(int fd, const std::string& interface) noexcept {
   ifreq request = request_for(interface);
   if (ioctl(fd, SIOCGIFINDEX, &request) != 0) return false;
@@ -63,7 +78,8 @@ SendResult result_of(int error) noexcept {
 
 }  // namespace
 
-Socket::Socket(const std::string& interface, bool fd_frames) : interface_(interface) {
+Socket::Socket(const std::string& interface, bool fd_frames)
+    : interface_(interface), arrival_times_(read_clocks()) {
   if (interface.empty() || interface.size() >= IFNAMSIZ) {
     errno = EINVAL;
     refuse("CAN interface '" + interface + "': a name has 1 to 15 characters");
@@ -88,6 +104,13 @@ Socket::Socket(const std::string& interface, bool fd_frames) : interface_(interf
         (request.ifr_mtu != classic_mtu && request.ifr_mtu != fd_mtu)) {
       errno = EPROTOTYPE;
       refuse("interface " + interface + " is no CAN interface");
+    }
+    if (!has_carrier(fd_, interface)) {
+      errno = ENETDOWN;
+      refuse("CAN interface " + interface +
+             " is up but has no carrier: its controller is bus-off? `ip -details link show " +
+             interface + "` tells; `ip link set " + interface + " down`, then `ip link set " +
+             interface + " up type can restart-ms 100` starts it again, and after every bus-off");
     }
     if (fd_frames && request.ifr_mtu != fd_mtu) {
       errno = EMSGSIZE;
@@ -139,7 +162,7 @@ SendResult Socket::send(const Frame& frame) noexcept {
   const ssize_t sent = ::send(fd_, &raw, size, MSG_DONTWAIT);
   if (sent == static_cast<ssize_t>(size)) return SendResult::sent;
   const SendResult result = result_of(errno);
-  if (result == SendResult::link_down || result == SendResult::gone) counter_fit_.restart();
+  if (result == SendResult::link_down || result == SendResult::gone) arrival_times_.restart();
   return result;
 }
 
@@ -161,31 +184,29 @@ ReceiveResult Socket::receive(Received& received) noexcept {
   const ssize_t size = receive_at_once();
   if (size < 0) {
     const bool down = errno == ENETDOWN;
-    if (!down && errno != ENODEV && errno != ENXIO) return ReceiveResult::nothing;
-    counter_fit_.restart();
+    if (!down && errno != ENODEV && errno != ENXIO) {
+      arrival_times_.queue_is_empty();
+      return ReceiveResult::nothing;
+    }
+    arrival_times_.restart();
     return down ? ReceiveResult::link_down : ReceiveResult::gone;
   }
   if (size != classic_mtu && size != fd_mtu) return ReceiveResult::nothing;
 
-  std::int64_t software_ns = 0;
-  std::int64_t adapter_ns = 0;
+  Stamps given;
   for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr;
        part = CMSG_NXTHDR(&message, part)) {
     if (part->cmsg_level != SOL_SOCKET) continue;
     if (part->cmsg_type == SO_TIMESTAMPING) {
       scm_timestamping stamps{};
       std::memcpy(&stamps, CMSG_DATA(part), sizeof stamps);
-      software_ns = nanoseconds(stamps.ts[0]);
-      adapter_ns = nanoseconds(stamps.ts[2]);
+      given = {.kernel_ns = nanoseconds(stamps.ts[0]), .adapter_ns = nanoseconds(stamps.ts[2])};
     } else if (part->cmsg_type == SO_RXQ_OVFL) {
       std::memcpy(&overflows_, CMSG_DATA(part), sizeof overflows_);
     }
   }
-  received.time_ns = software_ns != 0 ? software_ns - realtime_offset_ns() : monotonic_ns();
-  if (adapter_ns != 0) {
-    adapter_stamps_ = true;
-    received.time_ns = counter_fit_.to_monotonic(adapter_ns, received.time_ns);
-  }
+  received.time_ns = arrival_times_.of(given, read_clocks());
+  if (given.adapter_ns != 0) adapter_stamps_ = true;
 
   if ((raw.can_id & CAN_ERR_FLAG) != 0) {
     received.error_class = raw.can_id & CAN_ERR_MASK;
@@ -204,7 +225,7 @@ ReceiveResult Socket::receive(Received& received) noexcept {
 }
 
 bool Socket::rebind() noexcept {
-  counter_fit_.restart();
+  arrival_times_.restart();
   const SystemCall never_waits;
   return bind_to(fd_, interface_) && apply_filters();
 }

@@ -76,7 +76,7 @@ class Socket {
   std::vector<can_filter> filters_;
   std::uint32_t overflows_ = 0;
   bool adapter_stamps_ = false;
-  CounterFit counter_fit_;  // begins anew with the link: so does the adapter's counter
+  ArrivalTimes arrival_times_;
 };
 
 }  // namespace sinerig::can

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <ctime>
+#include <limits>
 #include <utility>
 
 namespace sinerig::can {
@@ -20,11 +22,21 @@ std::int64_t monotonic_ns() noexcept {
   return read_clock(CLOCK_MONOTONIC);
 }
 
-std::int64_t realtime_offset_ns() noexcept {
-  const std::int64_t before_ns = read_clock(CLOCK_MONOTONIC);
-  const std::int64_t real_ns = read_clock(CLOCK_REALTIME);
-  const std::int64_t after_ns = read_clock(CLOCK_MONOTONIC);
-  return real_ns - (before_ns + (after_ns - before_ns) / 2);
+Clocks read_clocks() noexcept {
+  constexpr int readings = 4;
+  constexpr std::int64_t undisturbed_ns = 20'000;
+  Clocks closest;
+  std::int64_t shortest_ns = std::numeric_limits<std::int64_t>::max();
+  for (int n = 0; n < readings && shortest_ns > undisturbed_ns; ++n) {
+    const std::int64_t before_ns = read_clock(CLOCK_MONOTONIC);
+    const std::int64_t real_ns = read_clock(CLOCK_REALTIME);
+    const std::int64_t after_ns = read_clock(CLOCK_MONOTONIC);
+    if (after_ns - before_ns >= shortest_ns) continue;
+    shortest_ns = after_ns - before_ns;
+    closest = {.monotonic_ns = after_ns,
+               .realtime_offset_ns = real_ns - (before_ns + shortest_ns / 2)};
+  }
+  return closest;
 }
 
 std::int64_t CounterFit::to_monotonic(std::int64_t counter_ns, std::int64_t seen_ns) noexcept {
@@ -49,7 +61,11 @@ std::int64_t CounterFit::to_monotonic(std::int64_t counter_ns, std::int64_t seen
     if (count_ < 2) fit();
   }
 
-  return std::min(counter_ns + difference_at(counter_ns), seen_ns);
+  return on_line(counter_ns, seen_ns);
+}
+
+std::int64_t CounterFit::on_line(std::int64_t counter_ns, std::int64_t seen_ns) const noexcept {
+  return started_ ? std::min(counter_ns + difference_at(counter_ns), seen_ns) : seen_ns;
 }
 
 std::int64_t CounterFit::difference_at(std::int64_t counter_ns) const noexcept {
@@ -97,6 +113,19 @@ void CounterFit::fit() noexcept {
   drift_ = sum_xx > 0.0 ? sum_xy / sum_xx : 0.0;
   reference_ns_ = origin.counter_ns;
   base_ns_ = origin.difference_ns + std::llround(mean_y - drift_ * mean_x);
+}
+
+// The offset is that of after the frame was received: a step since the last one shows, and so does
+// one between stamp and reading.
+std::int64_t ArrivalTimes::of(const Stamps& stamps, const Clocks& received) noexcept {
+  const std::int64_t offset_ns = received.realtime_offset_ns;
+  if (offset_ns_ && std::abs(offset_ns - *offset_ns_) > step_ns) clock_was_set_ = true;
+  offset_ns_ = offset_ns;
+  const bool is_known = stamps.kernel_ns != 0 && !clock_was_set_;
+  const std::int64_t seen_ns = is_known ? stamps.kernel_ns - offset_ns : received.monotonic_ns;
+  if (stamps.adapter_ns == 0) return seen_ns;
+  return clock_was_set_ ? counter_fit_.on_line(stamps.adapter_ns, seen_ns)
+                        : counter_fit_.to_monotonic(stamps.adapter_ns, seen_ns);
 }
 
 }  // namespace sinerig::can

@@ -7,6 +7,7 @@ namespace sinerig::gpio {
 Sample GpioActuator::write(double command) noexcept {
   const bool number = std::isfinite(command);
   const Drive drive = modulator_->next(number ? command : settings_.neutral);
+  released_ = false;
   // The levels change somewhere within the call.
   const std::int64_t before_ns = clock_.time_ns(clock_.now());
   const bool out = lines_->set(drive.levels | settings_.enable);
@@ -26,7 +27,8 @@ Sample GpioActuator::write(double command) noexcept {
 void GpioActuator::release() noexcept {
   const Drive rest = modulator_->rest();
   constexpr std::uint32_t line = 1U;
-  if (lines_->set((rest.levels & ~line) | safe_levels(settings_))) held_.value = rest.applied;
+  released_ = lines_->set((rest.levels & ~line) | safe_levels(settings_));
+  if (released_) held_.value = rest.applied;
 }
 
 }  // namespace sinerig::gpio

@@ -38,8 +38,10 @@ class GpioActuator final : public Actuator {
   // refused; the value is then what the lines held before.
   Sample write(double command) noexcept SINERIG_NONBLOCKING override;
 
-  // Every line to its safe level.
+  // Every line to its safe level. What the kernel refused is tried again by the next release() and
+  // by the destructor.
   void release() noexcept override;
+  bool released() const noexcept { return released_; }
 
   // Why the last write() had a fault, for people; empty when it had none. Not for the loop.
   std::string reason() const { return refused_ ? "the kernel refused to set the lines" : ""; }
@@ -51,6 +53,7 @@ class GpioActuator final : public Actuator {
   const Clock& clock_;
   Sample held_;
   bool refused_ = false;
+  bool released_ = true;
 };
 
 }  // namespace sinerig::gpio

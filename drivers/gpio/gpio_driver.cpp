@@ -36,6 +36,18 @@ class GpioDevice final : public Device {
     }
   }
 
+  void keep_released() noexcept override {
+    if (actuator_ && !actuator_->released()) actuator_->release();
+  }
+
+  std::string not_released() const override {
+    if (!actuator_ || actuator_->released()) return "";
+    std::string lines;
+    for (const Line& line : output_->lines.lines) lines += (lines.empty() ? "" : ", ") + line.name;
+    return "the kernel refused to set the lines to their safe levels, they may still drive: " +
+           output_->lines.chip + ", " + lines;
+  }
+
   void catch_up() override {
     for (const Input& input : inputs_)
       if (input.encoder != nullptr) input.encoder->catch_up();
@@ -100,7 +112,8 @@ class GpioDevice final : public Device {
 DriverKit gpio_driver(std::function<std::unique_ptr<LineBank>()> bank) {
   return {.name = "gpio",
           .summary = "GPIO lines: density, sign-magnitude or step outputs; encoders, interlocks",
-          .configure = [bank](const DeviceRequest& request) -> std::unique_ptr<Device> {
+          .configure =
+              [bank = std::move(bank)](const DeviceRequest& request) -> std::unique_ptr<Device> {
             return std::make_unique<GpioDevice>(request, bank);
           }};
 }

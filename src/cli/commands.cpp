@@ -46,6 +46,7 @@ int plan_command(const PlanOptions& options, const std::vector<DriverKit>& drive
     print_plan_as_json(rig, rig.plan());
   } else {
     report::print_plan(std::cout, rig.plan(), rig.sweep, rig.actuator.unit);
+    for (const Remark& remark : configured.remarks()) std::cout << remark.text << '\n';
   }
   return exit_done;
 }

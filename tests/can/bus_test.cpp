@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <functional>
 #include <limits>
 #include <net/if.h>
@@ -236,6 +237,33 @@ TEST_F(CanBus, ASampleIsAsOldAsItsFrameNotAsItsReading) {
   EXPECT_LE(sample.time_ns, after_ns);
 }
 
+// NTP that finds the clock an hour off sets it at once.
+TEST_F(CanBus, ASampleIsNoOlderWhenTheWallClockIsSet) {
+  const auto set_by = [](std::int64_t seconds) {
+    timespec time{};
+    clock_gettime(CLOCK_REALTIME, &time);
+    time.tv_sec += seconds;
+    return clock_settime(CLOCK_REALTIME, &time) == 0;
+  };
+  Peer peer;
+  Bus bus("vcan0", false);
+  CanSensor sensor(bus, position_feedback());
+  bus.start();
+  for (const std::int64_t step_s : {3600, -3600}) {
+    const std::int64_t before_ns = monotonic_ns();
+    peer.send(float_frame(feedback_id, 1.0));
+    ASSERT_TRUE(set_by(step_s));
+    EXPECT_GE(sensor.read().time_ns, before_ns);
+    EXPECT_EQ(sensor.read().fault, Fault::stale);
+    peer.send(float_frame(feedback_id, 2.0));
+    const std::int64_t after_ns = monotonic_ns();
+    usleep(5000);
+    const Sample next = sensor.read();
+    EXPECT_GE(next.time_ns, before_ns);
+    EXPECT_LE(next.time_ns, after_ns) << "stamped by the clock as it is now";
+  }
+}
+
 TEST_F(CanBus, OnlyMatchingFramesCount) {
   Peer peer;
   Bus bus("vcan0", false);
@@ -352,7 +380,9 @@ TEST_F(CanBus, NothingIsSentWhileBusOffAndAllIsWellAfterTheRestart) {
   Peer::inject_error(CAN_ERR_BUSOFF);
   EXPECT_EQ(actuator.write(2.0).fault, Fault::bus);
   EXPECT_EQ(sensor.read().fault, Fault::bus);
-  EXPECT_THAT(actuator.reason(), HasSubstr("bus-off"));
+  EXPECT_EQ(actuator.reason(),
+            "vcan0: bus-off; a controller with restart-ms 0, the default, stays off: `ip link set "
+            "vcan0 down`, then `… up type can restart-ms 100`");
   EXPECT_EQ(actuator.write(3.0).value, 1.0);
   EXPECT_EQ(bus.counters().bus_offs, 1u);
   EXPECT_EQ(bus.counters().dropped_dead, 2u);
@@ -903,6 +933,19 @@ TEST_F(CanBus, OpeningSaysWhatIsMissingAndWhatToDo) {
   shell("ip link set vcan0 mtu 16 && ip link set vcan0 up");
   EXPECT_THAT(refusal_of([] { Bus bus("vcan0", true); }),
               HasSubstr("carries classic frames only, the rig sends CAN-FD"));
+}
+
+// As that of a controller in bus-off is; here because the other end of the wire is down.
+TEST_F(CanBus, AnInterfaceWithoutACarrierIsRefused) {
+  std::system("ip link del can8 2>/dev/null");
+  shell("ip link add can8 type vxcan peer name can9 && ip link set can8 up");
+  EXPECT_THAT(refusal_of([] { Bus bus("can8", false); }),
+              HasSubstr("can8 is up but has no carrier: its controller is bus-off? `ip -details "
+                        "link show can8` tells; `ip link set can8 down`, then `ip link set can8 up "
+                        "type can restart-ms 100` starts it again, and after every bus-off"));
+  shell("ip link set can9 up");
+  EXPECT_EQ(refusal_of([] { Bus bus("can8", false); }), "");
+  shell("ip link del can8");
 }
 
 }  // namespace

@@ -108,6 +108,47 @@ TEST(CanProfile, RmdTorqueReplyIsToldApartByItsCommandByte) {
   EXPECT_NEAR(value_of(angle, {0x92, 0, 0, 0, 0xA0, 0x8C, 0, 0}), 6.283185307179586, 1e-12);
 }
 
+TEST(CanProfile, RmdAnswersSpeedAsItAnswersCurrent) {
+  const Profile rmd("myactuator-rmd.toml", 1);
+  const FeedbackSettings velocity = rmd.feedback("velocity");
+  const FeedbackSettings current = rmd.feedback("current");
+  for (const std::uint8_t command :
+       {rmd.command("current").frame.data[0], rmd.command("velocity").frame.data[0]}) {
+    const Bytes answer{command, 0x1E, 0x64, 0x00, 0xB4, 0x00, 0x2D, 0x00};
+    EXPECT_NEAR(value_of(velocity, answer), 3.141592653589793, 1e-12);
+    EXPECT_NEAR(value_of(current, answer), 1.0, 1e-12);
+  }
+  Frame other;
+  other.id = velocity.pattern.id;
+  other.length = 8;
+  for (const std::uint8_t first : Bytes{0x92, 0x9A, 0x9C, 0xA4, 0x81}) {
+    other.data[0] = first;
+    EXPECT_FALSE(velocity.pattern.matches(other)) << int{first};
+  }
+}
+
+TEST(CanProfile, RmdIsAskedForItsErrors) {
+  for (const char* name : {"current", "velocity"}) {
+    const CommandSettings command = Profile("myactuator-rmd.toml", 1).command(name);
+    ASSERT_EQ(command.keep_alive.size(), 1u);
+    EXPECT_EQ(bytes_of(command.keep_alive[0].frame), (Bytes{0x9A, 0, 0, 0, 0, 0, 0, 0}));
+    EXPECT_EQ(command.keep_alive[0].frame.id, 0x141u);
+    EXPECT_EQ(command.keep_alive[0].period_ns, 100'000'000);
+    ASSERT_EQ(command.health.size(), 1u);
+    const HealthRule& rule = command.health[0];
+    EXPECT_EQ(rule.value, 0.0);
+    EXPECT_GT(rule.max_age_ns, command.keep_alive[0].period_ns);
+    Frame status;
+    status.id = 0x241;
+    status.length = 8;
+    status.data = {0x9A, 0x32, 0, 1, 0xE5, 0x01, 0x04, 0x10};  // 48.5 V; low voltage, too hot
+    EXPECT_TRUE(rule.pattern.matches(status));
+    EXPECT_EQ(decode(status.payload(), rule.signal), 0x1004);
+    status.data[0] = 0xA1;
+    EXPECT_FALSE(rule.pattern.matches(status));
+  }
+}
+
 TEST(CanProfile, Gm6020IsBigEndianAndWraps) {
   const Profile gm("dji-gm6020.toml", 2);
   const CommandSettings current = gm.command("current");
@@ -345,6 +386,87 @@ TEST(CanProfile, EveryShippedProfileIsReadWholeByTheDriver) {
     ++profiles;
   }
   EXPECT_EQ(profiles, 8);
+}
+
+// A device on a rig file in TempDir with this loop and these keys of [actuator] and [sensor.s];
+// profiles are found in the shipped folder.
+std::vector<std::string> remarks_of(double rate_hz, const std::string& actuator,
+                                    const std::string& sensor, std::string* doubt = nullptr) {
+  const std::string common = "driver = \"can\"\ninterface = \"can0\"\n";
+  const config::Rig rig = config::read_rig(RigFile::parse(
+      "[loop]\nrate_hz = " + std::to_string(rate_hz) +
+          "\n[sweep]\nstart_hz = 1\nstop_hz = 10\npoints = 3\namplitude = 0.1\n[limits]\n"
+          "[actuator]\n" +
+          common + actuator + "[sensor.s]\n" + common + sensor,
+      devices + "/rig.toml"));
+  const auto device = can_driver().configure({rig, &rig.actuator, {&rig.sensors.front()}});
+  rig.file->refuse_unread();
+  std::vector<std::string> texts;
+  for (const Remark& remark : device->remarks()) {
+    if (remark.doubts && doubt != nullptr) *doubt = remark.text;
+    texts.push_back(remark.text);
+  }
+  return texts;
+}
+
+const std::string some_sensor = "id = 9\nlength = 8\nstart_bit = 0\n";
+
+TEST(CanConfig, TellsWhatTheBitsOfEveryChannelWereTakenFor) {
+  EXPECT_THAT(
+      remarks_of(1000.0, "profile = \"odrive.toml\"\ncommand = \"torque\"\nnode = 3\n",
+                 "id = 0x8009\nextended = true\nlength = 8\nstart_bit = 7\norder = \"motorola\"\n"
+                 "type = \"int\"\nbits = 32\n"),
+      testing::ElementsAre("command: Axis0_Set_Input_Torque.Input_Torque, frame 0x06E, bits 0|32 "
+                           "Intel, float32, scale 1, offset 0",
+                           "s: frame 0x00008009 (29 bit), bits 7|32 Motorola, signed, scale 1, "
+                           "offset 0"));
+}
+
+TEST(CanConfig, DoubtsAFloatThatItsDbcFileCallsAnInteger) {
+  const std::string path = testing::TempDir() + "/doubtful.dbc";
+  const auto doubt_of = [&](const std::string& signal, const std::string& more = "") {
+    std::ofstream{path} << "VERSION \"\"\n\nBO_ 256 Report: 8 Drive\n SG_ Position : " << signal
+                        << " [0|0] \"rad\" Vector__XXX\n\n"
+                        << more;
+    std::string doubt;
+    remarks_of(1000.0, "id = 1\nlength = 8\nstart_bit = 0\n",
+               "dbc = \"" + path + "\"\nsignal = \"Report.Position\"\n", &doubt);
+    return doubt;
+  };
+  EXPECT_EQ(doubt_of("0|32@1- (1,0)"),
+            "s: Report.Position is a 32-bit integer with scale 1 in the DBC file; if the device "
+            "sends a float there, its SIG_VALTYPE_ is missing");
+  EXPECT_NE(doubt_of("0|32@1+ (1,0)"), "");
+  EXPECT_EQ(doubt_of("0|32@1- (1,0)", "SIG_VALTYPE_ 256 Position : 1;\n"), "");
+  EXPECT_EQ(doubt_of("0|32@1- (0.001,0)"), "");
+  EXPECT_EQ(doubt_of("0|16@1- (1,0)"), "");
+}
+
+TEST(CanProfile, Cia402IsRefusedAtAnotherRateThanItsInterpolationTime) {
+  const std::string drive = "profile = \"cia402.toml\"\ncommand = \"torque\"\nnode = 1\n";
+  EXPECT_NO_THROW(remarks_of(1000.0, drive, some_sensor));
+  EXPECT_THAT(
+      [&] { remarks_of(500.0, drive, some_sensor); },
+      testing::ThrowsMessage<ConfigError>(testing::AllOf(
+          HasSubstr("cia402.toml:"),
+          HasSubstr("[device] rate_hz = 1000: is what the start-up list sets the drive up for, and "
+                    "[loop] rate_hz is 500: give the loop this rate, or add the steps that set up "
+                    "another one to [[actuator.startup]] and rate_hz = 500 to [actuator]"))));
+  EXPECT_NO_THROW(remarks_of(500.0, drive + "rate_hz = 500\n", some_sensor));
+  const Step other = Laid("cia402.toml", "command", "torque",
+                          "startup = [{ name = \"interpolation time 2 · 10^-3 s\", id = 0x600, "
+                          "bytes = [0x2F, 0xC2, 0x60, 0x01, 0x02, 0, 0, 0], expect_id = 0x580 }]\n",
+                          4)
+                         .command()
+                         .startup.back();
+  EXPECT_EQ(other.frame->id, 0x604u) << "the node's, after the profile's steps";
+  EXPECT_EQ(other.expect->pattern.id, 0x584u);
+  EXPECT_THAT([&] { remarks_of(250.0, drive + "rate_hz = 500\n", some_sensor); },
+              testing::ThrowsMessage<ConfigError>(HasSubstr("[actuator] rate_hz = 500")));
+  EXPECT_NO_THROW(
+      remarks_of(500.0, "id = 1\nlength = 8\nstart_bit = 0\n",
+                 "profile = \"cia402.toml\"\nfeedback = \"position\"\nnode = 1\nunit = \"1\"\n"))
+      << "nothing is set up for a sensor alone";
 }
 
 // What is said about an actuator section with these keys.

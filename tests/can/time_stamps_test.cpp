@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <ctime>
 #include <random>
+#include <utility>
 
 #include <gtest/gtest.h>
 
@@ -103,11 +105,107 @@ TEST(CounterFit, KeepsItsLineWhileTheHostIsBusy) {
   }
 }
 
-TEST(TimeStamps, OffsetToTheWallClockIsRepeatable) {
-  const std::int64_t first_ns = realtime_offset_ns();
-  const std::int64_t second_ns = realtime_offset_ns();
-  EXPECT_LT(std::abs(second_ns - first_ns), 1'000'000'000);
-  EXPECT_GT(first_ns, 0) << "the wall clock began before the machine did";
+// Frames every millisecond, seen 0.2 ms after they arrived; a wall clock that somebody sets.
+struct Stamped {
+  static constexpr std::int64_t wall_began_ns = 1'700'000'000'000'000'000;
+  static constexpr std::int64_t delay_ns = 200'000;
+
+  std::int64_t offset_ns = wall_began_ns;
+  std::int64_t now_ns = 5'000'000'000;
+  ArrivalTimes arrival_times{{.monotonic_ns = now_ns, .realtime_offset_ns = offset_ns}};
+
+  Stamps stamps(bool by_adapter) const {
+    return {.kernel_ns = now_ns + delay_ns + offset_ns,
+            .adapter_ns = by_adapter ? now_ns + 3'000'000'000 : 0};
+  }
+  // What is said of a frame with these stamps that is received now.
+  std::int64_t time_of(const Stamps& stamps) {
+    return arrival_times.of(stamps, {.monotonic_ns = now_ns, .realtime_offset_ns = offset_ns});
+  }
+  // A frame, received half a millisecond later; its age in the end.
+  std::int64_t error_of_a_frame(bool by_adapter) {
+    const std::int64_t arrived_ns = now_ns + delay_ns;
+    const Stamps given = stamps(by_adapter);
+    now_ns += 500'000;
+    const std::int64_t time_ns = time_of(given);
+    arrival_times.queue_is_empty();
+    now_ns += 500'000;
+    return time_ns - arrived_ns;
+  }
+};
+
+TEST(ArrivalTimes, AreTheKernelsStampsInMonotonicTime) {
+  Stamped bus;
+  for (int n = 0; n < 100; ++n) ASSERT_EQ(bus.error_of_a_frame(false), 0);
+  bus.offset_ns += 300'000;
+  EXPECT_EQ(bus.error_of_a_frame(false), 0) << "two readings may be that far apart";
+}
+
+TEST(ArrivalTimes, OutlastAStepOfTheWallClock) {
+  for (const double step_s : {3600.0, -3600.0, 0.03, -0.03, 0.002}) {
+    for (const bool by_adapter : {false, true}) {
+      Stamped bus;
+      for (int n = 0; n < 3000; ++n) bus.error_of_a_frame(by_adapter);
+      // Two frames wait, one stamped by the clock as it was, one by the clock as it is.
+      const std::int64_t first_ns = bus.now_ns + Stamped::delay_ns;
+      const Stamps before = bus.stamps(by_adapter);
+      bus.now_ns += 1'000'000;
+      bus.offset_ns += std::llround(step_s * 1e9);
+      const Stamps after = bus.stamps(by_adapter);
+      bus.now_ns += 500'000;
+      for (const auto& [stamps, arrived_ns] :
+           {std::pair{before, first_ns}, std::pair{after, first_ns + 1'000'000}}) {
+        const std::int64_t time_ns = bus.time_of(stamps);
+        EXPECT_EQ(time_ns, by_adapter ? arrived_ns : bus.now_ns) << step_s;
+      }
+      bus.arrival_times.queue_is_empty();
+      for (int n = 0; n < 3000; ++n)
+        ASSERT_EQ(bus.error_of_a_frame(by_adapter), 0) << step_s << ' ' << n;
+    }
+  }
+}
+
+// A poll takes so many frames at most: the rest were stamped by the old clock, too.
+TEST(ArrivalTimes, DoubtEveryFrameThatWaitedWhileTheClockWasSet) {
+  Stamped bus;
+  bus.error_of_a_frame(false);
+  const Stamps waiting = bus.stamps(false);
+  bus.offset_ns += 3'600'000'000'000;
+  for (int n = 0; n < 1000; ++n) {
+    bus.now_ns += 1'000;
+    ASSERT_EQ(bus.time_of(waiting), bus.now_ns);
+  }
+}
+
+TEST(ArrivalTimes, BeginWithTheClockAsItWasWhenTheSocketWasOpened) {
+  Stamped bus;
+  const Stamps waiting = bus.stamps(false);
+  bus.now_ns += 1'000'000;
+  bus.offset_ns += 30'000'000;
+  EXPECT_EQ(bus.time_of(waiting), bus.now_ns);
+}
+
+TEST(ArrivalTimes, AreTheTimeOfReceiptWithoutAStamp) {
+  Stamped bus;
+  EXPECT_EQ(bus.time_of({}), bus.now_ns);
+}
+
+TEST(Clocks, AreReadTogether) {
+  const auto wall_ns = [] {
+    timespec time{};
+    clock_gettime(CLOCK_REALTIME, &time);
+    return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
+  };
+  const std::int64_t before_ns = monotonic_ns();
+  const std::int64_t wall_before_ns = wall_ns();
+  const Clocks clocks = read_clocks();
+  const std::int64_t wall_after_ns = wall_ns();
+  const std::int64_t after_ns = monotonic_ns();
+  EXPECT_GE(clocks.monotonic_ns, before_ns);
+  EXPECT_LE(clocks.monotonic_ns, after_ns);
+  // Right to what the readings themselves took, however long that was.
+  EXPECT_GE(clocks.realtime_offset_ns, wall_before_ns - after_ns);
+  EXPECT_LE(clocks.realtime_offset_ns, wall_after_ns - before_ns);
 }
 
 }  // namespace

@@ -1,10 +1,12 @@
 // Whatever a rig file holds, it is read, checked and planned, or refused with a ConfigError.
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "config/rig.h"
 #include "drivers/can/can_driver.h"
+#include "drivers/gpio/gpio_driver.h"
 #ifdef SINERIG_HAS_MODBUS
 #include "drivers/modbus/modbus_driver.h"
 #endif
@@ -28,6 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const std::vector<DriverKit> drivers{
       sim::sim_driver(),
       can::can_driver(),
+      gpio::gpio_driver([]() -> std::unique_ptr<gpio::LineBank> { return nullptr; }),  // not opened
 #ifdef SINERIG_HAS_MODBUS
       modbus::modbus_driver(),
 #endif

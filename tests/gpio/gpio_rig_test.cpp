@@ -159,6 +159,26 @@ TEST(GpioRig, SaysWhatTheLinesHoldWhenTheyCannotBeSet) {
               HasSubstr("the kernel refused to set the lines"));
 }
 
+TEST(GpioRig, TellsOfLinesThatDoNotGoSafeAndTriesAgain) {
+  Rig rig{rig_text(small, bridge + "enable_line = 2")};
+  rig.configured->open();
+  EXPECT_EQ(rig.configured->not_released(), "") << "requested at their safe levels";
+  Actuator& actuator = rig.configured->actuator();
+  actuator.write(1.0);
+  rig.lines.refuse = true;
+  actuator.release();
+  EXPECT_EQ(rig.lines.driven, 0b101U);
+  EXPECT_EQ(rig.configured->not_released(),
+            "the kernel refused to set the lines to their safe levels, they may still drive: "
+            "c, 0, 1, 2");
+  rig.configured->keep_released();
+  EXPECT_NE(rig.configured->not_released(), "");
+  rig.lines.refuse = false;
+  rig.configured->keep_released();
+  EXPECT_EQ(rig.lines.driven, 0U);
+  EXPECT_EQ(rig.configured->not_released(), "");
+}
+
 TEST(GpioRig, IsNotArmedWhileTheInterlockIsOpen) {
   Rig rig{rig_text(small, bridge, interlock)};
   rig.configured->open();
