@@ -27,7 +27,7 @@ class GpioDevice final : public Device {
                       make_modulator(output_->modulator), output_->settings, clock);
   }
 
-  void arm() override {
+  void check_may_arm() const override {
     for (const Input& input : inputs_) {
       if (input.interlock != nullptr && !input.interlock->closed())
         throw std::runtime_error(
@@ -35,6 +35,8 @@ class GpioDevice final : public Device {
             input.plan.lines.lines.front().name + " is not active); close it, then start again");
     }
   }
+
+  void arm() override { check_may_arm(); }
 
   void catch_up() override {
     for (const Input& input : inputs_)
