@@ -1,5 +1,5 @@
 # `cmake --install` and `cpack`: the program, its manual page and completions as the program itself
-# prints them, documentation, rig files, and a systemd unit.
+# prints them, documentation, rig files, and the systemd units.
 include(GNUInstallDirs)
 
 set(printed "${PROJECT_BINARY_DIR}/printed")
@@ -29,7 +29,7 @@ install(FILES README.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(FILES LICENSE RENAME copyright DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY config DESTINATION ${CMAKE_INSTALL_DOCDIR})
-install(FILES packaging/sinerig@.service DESTINATION lib/systemd/system)
+install(FILES packaging/sinerig@.service packaging/sinerig-night@.service DESTINATION lib/systemd/system)
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT "the sinerig team <sinerig@localhost>")

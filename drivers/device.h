@@ -35,6 +35,11 @@ class Device {
   // rearm(), it throws StopRequested when told to stop.
   virtual void open(const Clock& clock) = 0;
 
+  // Asked of all devices of the rig before the first of them is armed or armed again, and by
+  // whichever thread waits for one of them meanwhile: throws std::runtime_error where nothing may
+  // be armed, an interlock being open.
+  virtual void check_may_arm() const {}
+
   // Right before the first command: switches the device on. Throws like open(). A rig that is only
   // looked at is opened and never armed.
   virtual void arm() {}

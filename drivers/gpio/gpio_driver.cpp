@@ -27,7 +27,7 @@ class GpioDevice final : public Device {
                       make_modulator(output_->modulator), output_->settings, clock);
   }
 
-  void arm() override {
+  void check_may_arm() const override {
     for (const Input& input : inputs_) {
       if (input.interlock != nullptr && !input.interlock->closed())
         throw std::runtime_error(
@@ -47,6 +47,8 @@ class GpioDevice final : public Device {
     return "the kernel refused to set the lines to their safe levels, they may still drive: " +
            output_->lines.chip + ", " + lines;
   }
+
+  void arm() override { check_may_arm(); }
 
   void catch_up() override {
     for (const Input& input : inputs_)

@@ -17,6 +17,9 @@ constexpr std::size_t trial_exchanges = 100;
 // Of the 100 that were asked; those withheld while a late answer may come don't count. A line that
 // loses 1 % is refused once in 1e8 trials, one that loses 5 % once in 85.
 constexpr double largest_failed_part = 0.10;
+// Of the rate of set-points, for a frequency. The hold of one between two of them is known, what a
+// drive makes of it is not.
+constexpr double most_of_the_rate = 0.1;
 
 std::string milliseconds(std::int64_t duration_ns) {
   char text[32];
@@ -58,6 +61,21 @@ std::string obstacle(const Link& link, const Pace& pace) {
   text << ": set [loop] rate_hz to " << std::floor(1e9 / advised_ns) << " at most";
   if (fits_the_period)
     text << ", or response_timeout_s to " << std::ceil(slow_ns * 1e-4) * 1e-5 << " at least";
+  return text.str();
+}
+
+std::string doubt(const Link& link, const Pace& pace, double highest_hz) {
+  const LinkSettings& settings = link.settings();
+  const double exchange_ns = static_cast<double>(pace.median_ns + settings.connection.silence_ns);
+  const double rate_hz = 1e9 / std::max(static_cast<double>(settings.period_ns), exchange_ns);
+  if (pace.exchanges == 0 || highest_hz <= most_of_the_rate * rate_hz * (1.0 + 1e-6)) return "";
+  std::ostringstream text;
+  text.precision(4);
+  text << "[modbus." << settings.connection.name << "] " << rate_hz
+       << " exchanges a second, of which the sweep's highest frequency of " << highest_hz
+       << " Hz is more than a tenth: above " << most_of_the_rate * rate_hz
+       << " Hz a period has fewer than ten set-points, and what a drive adds between two of them "
+          "(a filter, interpolation) counts; raise [loop] rate_hz, or lower [sweep] stop_hz";
   return text.str();
 }
 

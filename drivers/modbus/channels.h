@@ -109,4 +109,8 @@ void require_pace(const Link& link, const Pace& pace);
 // What require_pace() would refuse; empty where there is nothing.
 std::string obstacle(const Link& link, const Pace& pace);
 
+// What is doubtful of a sweep up to `highest_hz` at this pace: the drive gets fewer than ten
+// set-points in a period, of which each stands for long. Empty where nothing is.
+std::string doubt(const Link& link, const Pace& pace, double highest_hz);
+
 }  // namespace sinerig::modbus

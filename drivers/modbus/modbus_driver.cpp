@@ -1,5 +1,6 @@
 #include "drivers/modbus/modbus_driver.h"
 
+#include <algorithm>
 #include <cstdio>
 #include <optional>
 #include <utility>
@@ -13,9 +14,17 @@ using config::Section;
 
 constexpr std::size_t trial_readings = 100;
 
+double highest_hz(const SweepSettings& sweep) {
+  double highest = std::max(sweep.start_hz, sweep.stop_hz);
+  for (const SubBand& band : sweep.sub_bands)
+    highest = std::max({highest, band.start_hz, band.stop_hz});
+  for (const double frequency : sweep.frequencies_hz) highest = std::max(highest, frequency);
+  return highest;
+}
+
 class ModbusDevice final : public Device {
  public:
-  explicit ModbusDevice(const DeviceRequest& request) {
+  explicit ModbusDevice(const DeviceRequest& request) : highest_hz_{highest_hz(request.rig.sweep)} {
     for (const Section& section : request.rig.file->children("modbus")) {
       connections_.push_back(read_connection(section, request.rig.rate_hz));
       connections_.back().link.loop = request.rig.realtime;
@@ -102,6 +111,8 @@ class ModbusDevice final : public Device {
                                    "; " + grant->remedy});
       if (const std::string what = obstacle(*links_[n], trials_[n]); !what.empty())
         remarks.push_back({.text = what, .stops_a_sweep = true});
+      if (const std::string what = doubt(*links_[n], trials_[n], highest_hz_); !what.empty())
+        remarks.push_back({.text = what});
     }
     return remarks;
   }
@@ -147,6 +158,7 @@ class ModbusDevice final : public Device {
     return text;
   }
 
+  double highest_hz_;  // of the sweep
   std::vector<Connection> connections_;
   std::optional<CommandSettings> command_;
   std::size_t command_connection_ = 0;

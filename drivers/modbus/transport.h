@@ -76,7 +76,8 @@ class Transport {
   Transport(const Transport&) = delete;
   Transport& operator=(const Transport&) = delete;
 
-  // Looks the host up; throws std::runtime_error saying what to look at.
+  // Looks the host up; throws std::runtime_error saying what to look at. A serial line is this
+  // transport's alone for as long as it is connected.
   void connect();
   // Again, at the address that connect() has found.
   bool try_connect() noexcept;
@@ -116,6 +117,9 @@ class Transport {
     void operator()(_modbus* context) const noexcept;
   };
 
+  bool take_port() noexcept;
+  void leave_port() noexcept;
+  void keep_others_out(bool out) const noexcept;
   bool runs_at_its_rate() const noexcept;
   bool switch_transmitter() noexcept;
   bool send(const RequestBytes& request) noexcept;
@@ -139,6 +143,7 @@ class Transport {
   std::int64_t usual_patience_ns_ = 0;
   bool connected_ = false;
   bool echoes_ = false;
+  int port_ = -1;     // serial lines: holds the lock that no other program of this kind gets
   LateAnswers late_;  // serial lines
   // Serial lines: what came between two questions, in which a late answer may not be whole yet.
   std::array<std::uint8_t, 512> stray_{};

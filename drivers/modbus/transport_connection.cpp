@@ -1,6 +1,7 @@
 // How a connection is made and ended; transport.cpp asks and waits on it.
 #include <algorithm>
 #include <cerrno>
+#include <fcntl.h>
 #include <netdb.h>
 #include <stdexcept>
 #include <unistd.h>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include <modbus/modbus.h>
+#include <sys/file.h>
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
@@ -79,35 +81,59 @@ void Transport::give_up() noexcept {
     close(socket());
     modbus_set_socket(context_.get(), -1);
   }
+  if (connected_ && settings_.serial) keep_others_out(false);
   context_.reset();
+  leave_port();
   connected_ = false;
+}
+
+// False, and errno, where another program has the line: two that ask on one line take each other's
+// answers. A lock goes with its process, however that ends, and holds for root; before libmodbus
+// sets the line's rate.
+bool Transport::take_port() noexcept {
+  port_ = open(settings_.device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (port_ < 0) return false;
+  if (flock(port_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK) return true;
+  leave_port();
+  errno = EBUSY;
+  return false;
+}
+
+void Transport::leave_port() noexcept {
+  if (port_ >= 0) close(port_);
+  port_ = -1;
+}
+
+// Programs that know nothing of the lock. A pseudo-terminal would stay closed to everybody after a
+// crash: its other end outlives that.
+void Transport::keep_others_out(bool out) const noexcept {
+  int lines = 0;
+  if (ioctl(socket(), TIOCMGET, &lines) == 0) ioctl(socket(), out ? TIOCEXCL : TIOCNXCL);
 }
 
 bool Transport::try_connect() noexcept {
   disconnect();
   if (settings_.serial) {
+    if (!take_port()) return false;
     context_.reset(modbus_new_rtu(settings_.device.c_str(), settings_.baud, settings_.parity, 8,
                                   settings_.stop_bits));
   } else {
     context_.reset(modbus_new_tcp_pi(found_host_.c_str(), std::to_string(settings_.port).c_str()));
   }
-  if (!context_) return false;
+  const auto failed = [&] {
+    const int error = errno;
+    give_up();
+    errno = error;
+    return false;
+  };
+  if (!context_) return failed();
   modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
   modbus_set_response_timeout(context_.get(), 0, connect_timeout_us);
   // Without a time-out between bytes the response time-out covers the whole answer.
   modbus_set_byte_timeout(context_.get(), 0, 0);
-  if (modbus_connect(context_.get()) != 0) {
-    const int error = errno;
-    context_.reset();
-    errno = error;
-    return false;
-  }
-  if (settings_.serial && (!runs_at_its_rate() || !switch_transmitter())) {
-    const int error = errno;
-    context_.reset();
-    errno = error;
-    return false;
-  }
+  if (modbus_connect(context_.get()) != 0) return failed();
+  if (settings_.serial && (!runs_at_its_rate() || !switch_transmitter())) return failed();
+  if (settings_.serial) keep_others_out(true);
   if (!settings_.serial) drop_what_waits(socket(), true);
   connected_ = true;
   answered_ = transaction_;
@@ -161,6 +187,11 @@ void Transport::connect() {
   if (error == ERANGE)
     throw std::runtime_error(where + "this serial port does not run at " +
                              std::to_string(settings_.baud) + " baud");
+  if (error == EBUSY)
+    throw std::runtime_error(where +
+                             "another program has this serial port open, a sweep or a check "
+                             "perhaps; `fuser -v " +
+                             settings_.device + "` tells which");
   const bool refused = error == ENOTTY || error == EINVAL;
   if (settings_.rs485 == Rs485::kernel && refused)
     throw std::runtime_error(where + "this serial port has no RS-485 mode (" + why +

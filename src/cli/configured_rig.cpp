@@ -1,6 +1,7 @@
 #include "cli/configured_rig.h"
 
 #include <algorithm>
+#include <mutex>
 #include <utility>
 
 namespace sinerig::cli {
@@ -81,10 +82,38 @@ void ConfiguredRig::open() {
   }
 }
 
-// A stop that comes as the last of them is armed is a stop, too.
+// What the devices say against arming, asked for as long as this lives; the first word stays.
+class ConfiguredRig::Objection final : public Veto {
+ public:
+  explicit Objection(ConfiguredRig& rig) : rig_{rig} { rig_.control_.veto = this; }
+  ~Objection() override { rig_.control_.veto = nullptr; }
+  Objection(const Objection&) = delete;
+  Objection& operator=(const Objection&) = delete;
+
+  bool stands() noexcept override {
+    const std::scoped_lock lock{mutex_};
+    try {
+      for (std::size_t i = 0; what_.empty() && i < rig_.parts_.size(); ++i)
+        rig_.parts_[i].device->check_may_arm();
+    } catch (const std::exception& objection) {
+      what_ = objection.what();
+    }
+    return !what_.empty();
+  }
+  const std::string& what() const { return what_; }
+
+ private:
+  ConfiguredRig& rig_;
+  std::mutex mutex_;  // a device may wait in a thread of its own
+  std::string what_;
+};
+
+// A stop that comes as the last of them is armed is a stop, too. So is an interlock that opens
+// while the list of a drive runs, which may home for minutes.
 template <class Switch>
 void ConfiguredRig::switch_on(Switch on) {
   const Waiting waiting{control_};
+  Objection objection{*this};
   try {
     for (Part& part : parts_) {
       waiting.go_on();
@@ -94,6 +123,7 @@ void ConfiguredRig::switch_on(Switch on) {
     waiting.go_on();
   } catch (...) {
     actuator_->release();
+    if (!objection.what().empty()) throw NotToBeArmed{objection.what()};
     throw;
   }
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <memory>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,12 @@
 #include "sweep/run_control.h"
 
 namespace sinerig::cli {
+
+// A device says that the rig may not be armed: somebody has opened an interlock.
+class NotToBeArmed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 class ConfiguredRig final : public Rearm {
  public:
@@ -29,7 +36,8 @@ class ConfiguredRig final : public Rearm {
   // Acquires the hardware; the accessors below are valid from here on. Throws StopRequested, as
   // arm(), where a stop is.
   void open();
-  // Where it throws, nothing is armed any more.
+  // Where it throws, nothing is armed any more. Throws NotToBeArmed where a device forbids it,
+  // before the first of them is armed or while it is.
   void arm();
   void catch_up();  // with what has come since: right before the loop
   std::string fault_reason(const Trip& trip) const override;
@@ -47,6 +55,8 @@ class ConfiguredRig final : public Rearm {
     bool actuates = false;
     std::vector<std::size_t> sensors;  // index in the rig of each sensor that the device serves
   };
+
+  class Objection;
 
   void choose_responses();
   template <class Switch>

@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <optional>
+#include <set>
 #include <sstream>
 
 #include <nlohmann/json.hpp>
@@ -14,6 +16,7 @@
 #include "cli/included_files.h"
 #include "cli/night_folder.h"
 #include "cli/output_file.h"
+#include "cli/real_time.h"
 #include "cli/recorded_run.h"
 #include "cli/service_notifier.h"
 #include "cli/stop_on_signal.h"
@@ -44,6 +47,10 @@ record::SweepWriter::IfExists if_exists(const NightTask& task) {
                     : record::SweepWriter::IfExists::refuse;
 }
 
+std::string name_of(const NightTask& task) {
+  return task.sweep->name + "-" + std::to_string(task.repeat);
+}
+
 void print_line(const ordered_json& json) {
   std::cout << json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) << std::endl;
 }
@@ -60,20 +67,26 @@ class Night {
     for (const NightTask& task : tasks_) {
       const std::unique_ptr<ConfiguredRig> configured = configured_rig(task, drivers_);
       of_sweep(*task.sweep, [&] { return configured->rig().plan(); });
-      if (state_of(task) != TaskState::not_begun) {
+      const TaskState state = state_of(task);
+      if (state != TaskState::not_begun) {
         refuse_changed_include(record::read_sweep(task.sweep_file), configured->rig(),
                                task.sweep_file);
       }
       included_[task.sweep_file] = included_text(configured->rig());
+      if (state != TaskState::done) require_rights(task, configured->rig());
     }
   }
 
   int run();
 
  private:
+  void require_rights(const NightTask& task, const config::Rig& rig);
   bool wait_for(const NightTask& task, const NightFolder& folder);
+  bool wait(double seconds);
+  void announce(const std::string& what);
   int attend(const NightTask& task, std::size_t number, const NightFolder& folder);
   int sweep(const NightTask& task, TaskState state);
+  int sweep_patiently(const NightTask& task, TaskState state);
   int conclude(const NightFolder& folder, int code);
   void tell(const NightTask& task, TaskState state, std::size_t number) const;
 
@@ -86,26 +99,53 @@ class Night {
   RunControl between_;                           // a stop, whenever it was asked for
   std::map<std::string, std::string> included_;  // by sweep file: what its rig led to at first
   std::map<std::string, std::string> failures_;  // by sweep file: could not be run at all
+  std::map<std::string, std::string> notes_;     // likewise: what its row tells beside
+  std::set<std::string> granted_;                // sweeps whose rig has its rights
+  double age_s_ = 0.0;                           // of the night, when this process took it up …
+  double taken_up_s_ = 0.0;                      // … at this time of elapsed_s()
+  std::string ended_by_;  // why nothing may be armed any more until a person has looked
 };
 
+// Once for all repeats. A rig that goes on without them is warned of when it runs.
+void Night::require_rights(const NightTask& task, const config::Rig& rig) {
+  if (!rig.require_realtime || !granted_.insert(task.sweep->name).second) return;
+  of_sweep(*task.sweep, [&] { return make_loop_thread(rig); });
+}
+
+void Night::announce(const std::string& what) {
+  if (options_.voice == Voice::text) spdlog::info(what);
+  service_.status(what);
+}
+
 // False when told to stop meanwhile.
+bool Night::wait(double seconds) {
+  return time_.wait_for(seconds, between_.stop_requests,
+                        [this] { service_.idle(std::chrono::steady_clock::now()); });
+}
+
+// The same. A time of day goes by the clock on the wall, whatever sets it meanwhile; a pause does
+// not.
 bool Night::wait_for(const NightTask& task, const NightFolder& folder) {
   const NightSweep& sweep = *task.sweep;
-  std::int64_t until_s = time_.now_s() + static_cast<std::int64_t>(sweep.pause_s);
-  if (task.repeat == 1 && sweep.second_of_day) {
-    until_s = std::max(until_s, next_time_of_day(folder.began_s(), *sweep.second_of_day));
-  }
+  double pause_s = sweep.pause_s;
+  std::optional<std::int64_t> not_before_s;
   if (task.repeat == 1 && sweep.start_after_s) {
-    until_s = std::max(until_s, folder.began_s() + static_cast<std::int64_t>(*sweep.start_after_s));
+    const double age_s = age_s_ + time_.elapsed_s() - taken_up_s_;
+    pause_s = std::max(pause_s, *sweep.start_after_s - age_s);
   }
-  if (until_s > time_.now_s()) {
-    const std::string what = "waiting until " + local_time_text(until_s) + " for " + sweep.name +
-                             "-" + std::to_string(task.repeat);
-    if (options_.voice == Voice::text) spdlog::info(what);
-    service_.status(what);
+  if (task.repeat == 1 && sweep.second_of_day) {
+    not_before_s = next_time_of_day(folder.began_s(), *sweep.second_of_day);
   }
-  return time_.wait_until(until_s, between_.stop_requests,
-                          [this] { service_.idle(std::chrono::steady_clock::now()); });
+  const std::int64_t now_s = time_.now_s();
+  const std::int64_t until_s =
+      std::max(now_s + static_cast<std::int64_t>(pause_s), not_before_s.value_or(now_s));
+  if (until_s > now_s) {
+    announce("waiting until " + local_time_text(until_s) + " for " + name_of(task));
+  }
+  if (!wait(pause_s)) return false;
+  return !not_before_s || time_.wait_until(*not_before_s, between_.stop_requests, [this] {
+    service_.idle(std::chrono::steady_clock::now());
+  });
 }
 
 void Night::tell(const NightTask& task, TaskState state, std::size_t number) const {
@@ -119,7 +159,7 @@ void Night::tell(const NightTask& task, TaskState state, std::size_t number) con
                 {"resumed", resumed},
                 {"sweep", task.sweep_file}});
   } else if (options_.voice == Voice::text) {
-    spdlog::info("{}-{}, {} of {}{}", task.sweep->name, task.repeat, number, tasks_.size(),
+    spdlog::info("{}, {} of {}{}", name_of(task), number, tasks_.size(),
                  resumed ? ", goes on" : "");
   }
 }
@@ -148,17 +188,44 @@ int Night::sweep(const NightTask& task, TaskState state) {
                     });
 }
 
+// A drive that is off for a while, or boots, is no reason to lose all that is left of the night: as
+// often as the rig file lets a dwell of it be tried again.
+int Night::sweep_patiently(const NightTask& task, TaskState state) {
+  for (std::uint32_t failed = 0;; ++failed) {
+    try {
+      return sweep(task, state);
+    } catch (const DevicesFailed& failure) {
+      const RetrySettings retry = configured_rig(task, drivers_)->rig().runner.retry;
+      if (failed == retry.faults) {
+        if (failed == 0) throw;
+        throw DevicesFailed{std::string{failure.what()} + " (" + std::to_string(failed) +
+                            " tries to begin again are spent, [retry])"};
+      }
+      notes_[task.sweep_file] =
+          "begun at try " + std::to_string(failed + 2) + ": " + failure.what();
+      spdlog::warn("{}: {}; once more in {} s, {} of {} ([retry])", name_of(task), failure.what(),
+                   retry.wait_s, failed + 1, retry.faults);
+      service_.status("waiting to try " + name_of(task) + " again");
+      if (!wait(retry.wait_s)) return exit_interrupted;
+    }
+  }
+}
+
 // Runs what is left of a task; the exit code of a run.
 int Night::attend(const NightTask& task, std::size_t number, const NightFolder& folder) {
   const TaskState state = state_of(task);
   if (state == TaskState::done) return exit_done;
-  if (state == TaskState::stopped && !job_.stop_on_stop) return exit_stopped;  // it had its chance
+  if (state == TaskState::stopped && !job_.stop_on_stop &&
+      to_be_looked_at(record::read_sweep(task.sweep_file)).empty()) {
+    return exit_stopped;  // it had its chance
+  }
   if (state == TaskState::not_begun && !wait_for(task, folder)) return exit_interrupted;
   if (between_.stop_requests.load() > 0) return exit_interrupted;
   tell(task, state, number);
-  const int ended = sweep(task, state);
+  const int ended = sweep_patiently(task, state);
   if (!fs::exists(task.sweep_file)) return ended;  // told to stop before it began
   const record::StoredRun run = record::read_sweep(task.sweep_file);
+  if (ended == exit_stopped) ended_by_ = to_be_looked_at(run);
   std::uint64_t ticks = 0;
   for (const record::StoredTiming& timing : run.timings) ticks += timing.ticks + timing.skipped;
   time_.pass(static_cast<double>(ticks) / run.plan.rate_hz);
@@ -168,6 +235,8 @@ int Night::attend(const NightTask& task, std::size_t number, const NightFolder& 
 int Night::run() {
   const StopOnSignal stop_on_signal{between_};
   const NightFolder folder{job_, time_};
+  age_s_ = static_cast<double>(std::max<std::int64_t>(0, time_.now_s() - folder.began_s()));
+  taken_up_s_ = time_.elapsed_s();
   service_.ready();
   int code = exit_done;
   std::size_t number = 0;
@@ -175,14 +244,21 @@ int Night::run() {
     int ended = exit_stopped;
     try {
       ended = attend(task, ++number, folder);
+    } catch (const NotToBeArmed& error) {
+      spdlog::error("{}", error.what());
+      failures_[task.sweep_file] = ended_by_ = error.what();
     } catch (const std::exception& error) {
       spdlog::error("{}", error.what());
       failures_[task.sweep_file] = error.what();
     }
     if (ended == exit_interrupted) return conclude(folder, exit_interrupted);
-    if (ended == exit_done) continue;
-    code = exit_stopped;
-    if (job_.stop_on_stop) break;
+    if (ended != exit_done) code = exit_stopped;
+    if (!ended_by_.empty()) {
+      ended_by_ = name_of(task) + ": " + ended_by_;
+      spdlog::error("the night ends here, until a person has looked: {}", ended_by_);
+      break;
+    }
+    if (ended != exit_done && job_.stop_on_stop) break;
   }
   return conclude(folder, code);
 }
@@ -194,10 +270,14 @@ int Night::conclude(const NightFolder& folder, int code) {
   bool changed = false;
   for (report::NightRow& row : rows) {
     changed = changed || row.changed();
-    const auto failure = failures_.find(row.file);
-    if (failure == failures_.end()) continue;
-    row.outcome = "failed";
-    row.detail = failure->second;
+    if (const auto failure = failures_.find(row.file); failure != failures_.end()) {
+      row.outcome = "failed";
+      row.detail = failure->second;
+    } else if (row.outcome == "not run") {
+      if (!ended_by_.empty()) row.detail = "a person has to look first, " + ended_by_;
+    } else if (const auto note = notes_.find(row.file); note != notes_.end()) {
+      row.detail += (row.detail.empty() ? "" : "; ") + note->second;
+    }
   }
   const ordered_json json = report::night_json(options_.job, rows);
   std::ostringstream words;

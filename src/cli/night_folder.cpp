@@ -10,6 +10,7 @@
 
 #include "cli/run_differences.h"
 #include "record/unfinished_run.h"
+#include "sweep/records.h"
 
 namespace sinerig::cli {
 
@@ -85,6 +86,22 @@ TaskState state_of(const NightTask& task) {
   const std::string outcome = run.fact("outcome");
   if (outcome == "done") return TaskState::done;
   return outcome == "stopped" ? TaskState::stopped : TaskState::unfinished;
+}
+
+std::string to_be_looked_at(const record::StoredRun& run) {
+  std::string reason;
+  bool interlock = false;
+  for (const record::StoredEvent& event : run.events) {
+    if (event.kind == to_string(EventKind::started)) {
+      interlock = false;
+      reason.clear();
+    }
+    if (event.fault == to_string(Fault::interlock)) interlock = true;
+    if (event.kind == to_string(EventKind::released)) reason.clear();
+    if (event.kind == to_string(EventKind::not_released))
+      reason = "its actuator has not taken its release";
+  }
+  return interlock ? "an interlock has opened" : reason;
 }
 
 namespace {

@@ -35,6 +35,10 @@ enum class TaskState { not_begun, unfinished, stopped, done };
 // another rig file, record::SweepFileError where it cannot be read.
 TaskState state_of(const NightTask& task);
 
+// Why a person has to look before anything is armed again, after the last part of a run: it went on
+// until an interlock opened, or its actuator has not taken its release. Empty where nobody has to.
+std::string to_be_looked_at(const record::StoredRun& run);
+
 // One row per task, compared where there are points. A file that cannot be read is a row, too.
 std::vector<report::NightRow> night_rows(const NightJob& job, const std::vector<NightTask>& tasks);
 

@@ -77,6 +77,21 @@ std::string reason_not_to_begin() {
   }
 }
 
+template <class Work>
+void of_devices(Work work) {
+  try {
+    work();
+  } catch (const StopRequested&) {
+    throw;
+  } catch (const NotToBeArmed&) {
+    throw;
+  } catch (const config::ConfigError&) {
+    throw;
+  } catch (const std::exception& failure) {
+    throw DevicesFailed{failure.what()};
+  }
+}
+
 // Once more after making room. Says what the disk said where that failed, too.
 std::string put_down_end(record::SweepWriter& writer, const RunEnd& end) {
   const auto put_down = [&] {
@@ -188,7 +203,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
   std::unique_ptr<SweepRunner> runner;
   bool to_measure = true;
   try {
-    attended(service, waiting, [&] { configured.open(); });
+    of_devices([&] { attended(service, waiting, [&] { configured.open(); }); });
     runner = std::make_unique<SweepRunner>(plan, settings, view ? view->clock() : clock,
                                            configured.actuator(), configured.sensors(), guard,
                                            outbox, &configured);
@@ -198,7 +213,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
       teller.resume(earlier->finished.points);
       if (view) view->run().resume(earlier->finished);
     }
-    if (to_measure) attended(service, waiting, [&] { configured.arm(); });
+    if (to_measure) of_devices([&] { attended(service, waiting, [&] { configured.arm(); }); });
     writer->begin_part(earlier != nullptr ? earlier->start : record::PartStart{});
     if (earlier != nullptr && !modes && without_review(plan, *runner, earlier->finished)) {
       writer->write(Event{.kind = EventKind::model_doubted,
@@ -210,7 +225,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
           writer->path());
     }
     // The disk may have taken longer than a queue of the kernel lasts.
-    if (to_measure) configured.catch_up();
+    if (to_measure) of_devices([&] { configured.catch_up(); });
   } catch (...) {
     writer->discard();
     if (control.stop_requests.load() == 0) throw;

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "cli/commands.h"
@@ -13,6 +14,12 @@
 #include "record/unfinished_run.h"
 
 namespace sinerig::cli {
+
+// The devices cannot be opened or armed: the drive is off, or boots. What passes by itself.
+class DevicesFailed : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
 
 struct RecordedRunOptions {
   std::string sweep_file;
@@ -31,8 +38,9 @@ using OpenSweepFile = std::function<std::unique_ptr<record::SweepWriter>()>;
 
 // Runs the plan, or what `earlier` has left of it, and returns the exit code. Signals are stop
 // requests meanwhile; one that comes before the loop begins leaves no file, and an earlier one as
-// it was. Throws where the rig or the file cannot be had: a file that was created for this is gone
-// then, an earlier one as it was. Whatever fails later ends the run: actuator released, reason in
+// it was. Throws where the rig or the file cannot be had, DevicesFailed where its devices fail and
+// NotToBeArmed where one of them forbids it: a file that was created for this is gone then, an
+// earlier one as it was. Whatever fails later ends the run: actuator released, reason in
 // the file where the disk takes it, exit code 3.
 int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedRunOptions& options,
                const OpenSweepFile& open_file, const record::UnfinishedRun* earlier = nullptr);

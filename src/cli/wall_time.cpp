@@ -12,6 +12,16 @@ namespace {
 // As often as a run tells how it goes.
 constexpr std::chrono::milliseconds look_interval{50};
 
+template <class NotYet>
+bool wait_while(NotYet not_yet, const std::atomic<int>& stop_requests,
+                const WallTime::Meanwhile& meanwhile) {
+  while (stop_requests.load() == 0 && not_yet()) {
+    meanwhile();
+    std::this_thread::sleep_for(look_interval);
+  }
+  return stop_requests.load() == 0;
+}
+
 std::string formatted(const std::tm& parts, const char* format) {
   char text[40];
   std::strftime(text, sizeof text, format, &parts);
@@ -24,19 +34,32 @@ std::int64_t SystemTime::now_s() {
   return std::time(nullptr);
 }
 
+double SystemTime::elapsed_s() {
+  std::timespec time{};
+  clock_gettime(CLOCK_BOOTTIME, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
 bool SystemTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
-                            const std::function<void()>& meanwhile) {
-  while (stop_requests.load() == 0 && now_s() < time_s) {
-    meanwhile();
-    std::this_thread::sleep_for(look_interval);
-  }
-  return stop_requests.load() == 0;
+                            const Meanwhile& meanwhile) {
+  return wait_while([&] { return now_s() < time_s; }, stop_requests, meanwhile);
+}
+
+bool SystemTime::wait_for(double seconds, const std::atomic<int>& stop_requests,
+                          const Meanwhile& meanwhile) {
+  const double until_s = elapsed_s() + seconds;
+  return wait_while([&] { return elapsed_s() < until_s; }, stop_requests, meanwhile);
 }
 
 bool PassingTime::wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
-                             const std::function<void()>& meanwhile) {
+                             const Meanwhile& meanwhile) {
+  return wait_for(static_cast<double>(time_s - now_s()), stop_requests, meanwhile);
+}
+
+bool PassingTime::wait_for(double seconds, const std::atomic<int>& stop_requests,
+                           const Meanwhile& meanwhile) {
   meanwhile();
-  now_s_ = std::max(now_s_, time_s);
+  elapsed_s_ += std::max(0.0, seconds);
   return stop_requests.load() == 0;
 }
 

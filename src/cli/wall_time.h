@@ -1,4 +1,5 @@
-// The time of day that a night is planned by: of the system, or one that passes at once.
+// The times that a night is planned by, of day and since it began: of the system, or ones that pass
+// at once.
 #pragma once
 
 #include <atomic>
@@ -10,39 +11,57 @@ namespace sinerig::cli {
 
 class WallTime {
  public:
+  // Called now and then while it is waited.
+  using Meanwhile = std::function<void()>;
+
   virtual ~WallTime() = default;
 
   // Seconds since 1970, UTC.
   virtual std::int64_t now_s() = 0;
 
-  // False where `stop_requests` rose before. `meanwhile` is called now and then.
+  // Seconds since a moment that stays the same for as long as the machine runs, awake or not: no
+  // step of the clock changes them.
+  virtual double elapsed_s() = 0;
+
+  // Until now_s() is that. False where `stop_requests` rose before.
   virtual bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
-                          const std::function<void()>& meanwhile) = 0;
+                          const Meanwhile& meanwhile) = 0;
+
+  // Until elapsed_s() has grown by that. The same.
+  virtual bool wait_for(double seconds, const std::atomic<int>& stop_requests,
+                        const Meanwhile& meanwhile) = 0;
 
   // A sweep has taken this much bench time.
   virtual void pass(double seconds) = 0;
 };
 
-// Steps of the clock and a machine that slept are seen at once.
+// A machine that slept is seen at once, and by the time of day a step of the clock.
 class SystemTime final : public WallTime {
  public:
   std::int64_t now_s() override;
+  double elapsed_s() override;
   bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
-                  const std::function<void()>& meanwhile) override;
+                  const Meanwhile& meanwhile) override;
+  bool wait_for(double seconds, const std::atomic<int>& stop_requests,
+                const Meanwhile& meanwhile) override;
   void pass(double) override {}
 };
 
 // For rigs that run in virtual time: nobody waits for half past ten in a simulation.
 class PassingTime final : public WallTime {
  public:
-  explicit PassingTime(std::int64_t start_s) : now_s_{start_s} {}
-  std::int64_t now_s() override { return now_s_; }
+  explicit PassingTime(std::int64_t start_s) : start_s_{start_s} {}
+  std::int64_t now_s() override { return start_s_ + static_cast<std::int64_t>(elapsed_s_); }
+  double elapsed_s() override { return elapsed_s_; }
   bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
-                  const std::function<void()>& meanwhile) override;
-  void pass(double seconds) override { now_s_ += static_cast<std::int64_t>(seconds); }
+                  const Meanwhile& meanwhile) override;
+  bool wait_for(double seconds, const std::atomic<int>& stop_requests,
+                const Meanwhile& meanwhile) override;
+  void pass(double seconds) override { elapsed_s_ += seconds; }
 
  private:
-  std::int64_t now_s_;
+  std::int64_t start_s_;
+  double elapsed_s_ = 0.0;
 };
 
 // The first time at or after `from_s` at which the local time of day is `second_of_day`.

@@ -9,7 +9,9 @@ namespace sinerig {
 bool Waiting::may_go_on() const noexcept {
   if (control_ == nullptr) return true;
   control_->turns.fetch_add(1, std::memory_order_relaxed);
-  return !stoppable_ || control_->stop_requests.load() == 0;
+  if (!stoppable_) return true;
+  Veto* const veto = control_->veto.load();
+  return control_->stop_requests.load() == 0 && (veto == nullptr || !veto->stands());
 }
 
 void Waiting::go_on() const {

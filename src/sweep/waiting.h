@@ -30,7 +30,8 @@ class Waiting {
     return waiting;
   }
 
-  // Once a turn. False where a stop is requested.
+  // Once a turn. False where a stop is requested, or a veto stands: to whoever waits that is a
+  // stop, too.
   bool may_go_on() const noexcept;
   // The same. Throws StopRequested.
   void go_on() const;

@@ -1,6 +1,7 @@
 // `sinerig night`: several sweeps as one job.
 #include <csignal>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -43,25 +44,40 @@ class Night : public test::ProgramTest {
 class WatchedTime final : public cli::WallTime {
  public:
   explicit WatchedTime(std::int64_t start_s) : time_{start_s} {}
-  std::int64_t now_s() override { return time_.now_s(); }
+  std::int64_t now_s() override { return time_.now_s() + step_s_; }
+  double elapsed_s() override { return time_.elapsed_s(); }
   bool wait_until(std::int64_t time_s, const std::atomic<int>& stop_requests,
-                  const std::function<void()>& meanwhile) override {
+                  const Meanwhile& meanwhile) override {
     waits.push_back(time_s - now_s());
-    const bool go = time_.wait_until(time_s, stop_requests, meanwhile);
+    const bool go = time_.wait_for(static_cast<double>(time_s - now_s()), stop_requests, meanwhile);
+    return go;
+  }
+  bool wait_for(double seconds, const std::atomic<int>& stop_requests,
+                const Meanwhile& meanwhile) override {
+    pauses.push_back(seconds);
+    const bool go = time_.wait_for(seconds, stop_requests, meanwhile);
+    step_s_ += step_in_pause_s;
     if (raised_after_wait != 0) std::raise(raised_after_wait);
+    if (raised_in_pause == pauses.size()) std::raise(SIGTERM);
     return go;
   }
   void pass(double seconds) override {
     time_.pass(seconds);
+    step_s_ += step_after_sweep_s;
     if (raised_after_sweep != 0) std::raise(raised_after_sweep);
   }
 
-  std::vector<std::int64_t> waits;
-  int raised_after_wait = 0;  // signals
+  std::vector<std::int64_t> waits;  // by the time of day
+  std::vector<double> pauses;
+  std::int64_t step_after_sweep_s = 0;  // of the clock
+  std::int64_t step_in_pause_s = 0;     // likewise
+  std::size_t raised_in_pause = 0;      // SIGTERM, in this one, from 1
+  int raised_after_wait = 0;            // signals
   int raised_after_sweep = 0;
 
  private:
   cli::PassingTime time_;
+  std::int64_t step_s_ = 0;
 };
 
 TEST_F(Night, RunsEverySweepAndTellsWhatChanged) {
@@ -160,8 +176,209 @@ TEST_F(Night, WaitsForTheTimesOfTheJob) {
   WatchedTime time{1772398800};
   const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
   EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 0);
-  EXPECT_EQ(time.waits, (std::vector<std::int64_t>{1000, 60}));
+  EXPECT_EQ(time.pauses, (std::vector<double>{1000, 60}));
+  EXPECT_THAT(time.waits, testing::IsEmpty());
   EXPECT_GT(time.now_s(), 1772398800 + 1060) << "sweeps take their time, too";
+}
+
+// It would end a pause at once, or prolong it by as much.
+TEST_F(Night, AStepOfTheClockChangesNoPause) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\npause_s = 60\n"
+      "[[night.sweep]]\nname = \"late\"\nrig = \"axis.toml\"\nstart_after_s = 20000\n");
+  for (const std::int64_t step_s : {-3600, 3600}) {
+    fs::remove_all(path("out"));
+    WatchedTime time{1772398800};
+    time.step_after_sweep_s = time.step_in_pause_s = step_s;
+    const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+    EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 0);
+    ASSERT_EQ(time.pauses.size(), 3U);
+    EXPECT_EQ(time.pauses[1], 60);
+    EXPECT_LT(time.pauses[2], 20000 - 120);
+    EXPECT_GT(time.pauses[2], 20000 - 120 - 100) << "two sweeps of less than a minute";
+    EXPECT_THAT(time.waits, testing::IsEmpty());
+  }
+}
+
+// A time of day is that of the clock on the wall, whoever sets it.
+TEST_F(Night, AStepOfTheClockMovesATimeOfDay) {
+  const std::int64_t start_s = 1772398800;
+  const std::time_t at = start_s + 7200;
+  char text[8];
+  std::strftime(text, sizeof text, "%H:%M", std::localtime(&at));
+  job("[[night.sweep]]\nrig = \"axis.toml\"\n"
+      "[[night.sweep]]\nname = \"late\"\nrig = \"axis.toml\"\nstart_at = \"" +
+      std::string{text} + "\"\n");
+  WatchedTime time{start_s};
+  time.step_after_sweep_s = 3600;
+  const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+  EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 0);
+  ASSERT_EQ(time.waits.size(), 1U);
+  EXPECT_LT(time.waits[0], 3600);
+  EXPECT_GT(time.waits[0], 3500);
+}
+
+struct Trouble {
+  int refusals = 0;           // so many times the drive cannot be connected to
+  int reads_until_open = -1;  // of the door; below 0: stays closed
+  bool open = false;          // the door, from the beginning
+  std::string not_released;
+};
+
+// A simulated rig with a drive that may not answer; its second sensor is the interlock of a door.
+class TroubledDevice final : public Device, public Sensor {
+ public:
+  TroubledDevice(DeviceRequest request, Trouble& trouble) : trouble_{trouble} {
+    request.sensors.resize(1);
+    device_ = sim::sim_driver().configure(request);
+  }
+  void open(const Clock& clock) override {
+    clock_ = &clock;
+    if (trouble_.refusals-- > 0) throw std::runtime_error{"no connection (Connection refused)"};
+    device_->open(clock);
+  }
+  void check_may_arm() const override {
+    if (trouble_.open) throw std::runtime_error{"door: the interlock is open"};
+  }
+  void arm() override { device_->arm(); }
+  std::string not_released() const override { return trouble_.not_released; }
+  bool measures(std::size_t sensor) const override { return sensor == 0; }
+  Actuator* actuator() noexcept override { return device_->actuator(); }
+  Sensor& sensor(std::size_t index) noexcept override {
+    return index == 0 ? device_->sensor(0) : *this;
+  }
+  Sample read() noexcept override {
+    const bool closed = trouble_.reads_until_open < 0 || trouble_.reads_until_open > 0;
+    if (trouble_.reads_until_open > 0) --trouble_.reads_until_open;
+    return {.value = closed ? 1.0 : 0.0,
+            .time_ns = clock_->time_ns(clock_->now()),
+            .fault = closed ? Fault::none : Fault::interlock};
+  }
+
+ private:
+  Trouble& trouble_;
+  std::unique_ptr<Device> device_;
+  const Clock* clock_ = nullptr;
+};
+
+class TroubledNight : public Night {
+ protected:
+  // `keys`: of the rig file.
+  explicit TroubledNight(const std::string& keys) {
+    std::string text = rig_text;
+    text.insert(text.find("[plant]"), keys);
+    write("axis.toml", text);
+  }
+  int night() {
+    const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
+    const DriverKit kit{.name = "sim", .summary = "", .configure = [this](const DeviceRequest& to) {
+                          return std::make_unique<TroubledDevice>(to, trouble);
+                        }};
+    return cli::run_night(options, {kit}, time);
+  }
+  std::string detail(std::size_t sweep) const {
+    return summary().at("sweeps").at(sweep).at("detail").get<std::string>();
+  }
+
+  Trouble trouble;
+  WatchedTime time{1772398800};
+};
+
+class NightOfARefusingDrive : public TroubledNight {
+ protected:
+  NightOfARefusingDrive() : TroubledNight{"[retry]\nfaults = 3\nwait_s = 40\n"} {}
+};
+
+TEST_F(NightOfARefusingDrive, TriesAgainAsTheRigFileSays) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\n");
+  trouble.refusals = 3;
+  EXPECT_EQ(night(), 0);
+  EXPECT_EQ(time.pauses, (std::vector<double>{0, 40, 40, 40}));
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "done");
+  EXPECT_EQ(detail(0), "begun at try 4: no connection (Connection refused)");
+}
+
+TEST_F(NightOfARefusingDrive, GivesASweepUpWhenItsTriesAreSpent) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  trouble.refusals = 5;
+  EXPECT_EQ(night(), 3);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "failed");
+  EXPECT_EQ(detail(0),
+            "no connection (Connection refused) (3 tries to begin again are spent, [retry])");
+  EXPECT_EQ(summary()["sweeps"][1].at("outcome"), "done") << "each has its own";
+}
+
+TEST_F(NightOfARefusingDrive, GoesOnWithAnUnfinishedSweepLikewise) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nset.sensor.y.max = 0.1\n", "on_stop = \"stop\"\n");
+  EXPECT_EQ(night(), 3);
+  trouble.refusals = 2;
+  EXPECT_EQ(night(), 3);
+  EXPECT_EQ(record::read_sweep(path("out/axis-1.sweep")).parts.size(), 2U);
+  EXPECT_EQ(time.pauses, (std::vector<double>{0, 40, 40}));
+}
+
+TEST_F(NightOfARefusingDrive, IsStoppedInTheWait) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n");
+  trouble.refusals = 2;
+  time.raised_in_pause = 2;
+  EXPECT_EQ(night(), 4);
+  EXPECT_EQ(trouble.refusals, 1);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "not run");
+  EXPECT_EQ(detail(0), "");
+}
+
+class NightWithoutRetry : public TroubledNight {
+ protected:
+  NightWithoutRetry() : TroubledNight{""} {}
+};
+
+TEST_F(NightWithoutRetry, TriesOnce) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\n");
+  trouble.refusals = 1;
+  EXPECT_EQ(night(), 3);
+  EXPECT_EQ(trouble.refusals, 0);
+  EXPECT_EQ(detail(0), "no connection (Connection refused)");
+}
+
+// on_stop = "next" all along.
+class NightBehindADoor : public TroubledNight {
+ protected:
+  NightBehindADoor() : TroubledNight{"[sensor.door]\n[retry]\nfaults = 3\n"} {
+    job("[[night.sweep]]\nrig = \"axis.toml\"\nrepeat = 2\n"
+        "[[night.sweep]]\nname = \"other\"\nrig = \"axis.toml\"\n");
+  }
+  void expect_rest_not_run(const std::string& why) const {
+    for (const std::size_t sweep : {1U, 2U}) {
+      EXPECT_EQ(summary().at("sweeps").at(sweep).at("outcome"), "not run");
+      EXPECT_EQ(detail(sweep), "a person has to look first, " + why);
+    }
+  }
+};
+
+TEST_F(NightBehindADoor, EndsWhenTheInterlockHasOpenedAndGoesOnWhenItIsCalledAgain) {
+  trouble.reads_until_open = 1000;
+  EXPECT_EQ(night(), 3);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "stopped");
+  expect_rest_not_run("axis-1: an interlock has opened");
+  trouble.reads_until_open = -1;
+  EXPECT_EQ(night(), 0);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("parts"), 2);
+}
+
+TEST_F(NightBehindADoor, EndsWhereAnActuatorIsNotReleased) {
+  trouble.not_released = "the drive has not taken its disarm list";
+  EXPECT_EQ(night(), 3);
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "stopped");
+  expect_rest_not_run("axis-1: its actuator has not taken its release");
+  trouble.not_released = "";
+  EXPECT_EQ(night(), 0);
+}
+
+TEST_F(NightBehindADoor, DoesNotKnockWhileTheInterlockIsOpen) {
+  trouble.open = true;
+  EXPECT_EQ(night(), 3);
+  EXPECT_EQ(time.pauses.size(), 1U) << "no try again";
+  EXPECT_EQ(summary().at("sweeps").at(0).at("outcome"), "failed");
+  expect_rest_not_run("axis-1: door: the interlock is open");
 }
 
 TEST_F(Night, IsStoppedByASignalBetweenItsWaitAndTheSweep) {
@@ -170,7 +387,7 @@ TEST_F(Night, IsStoppedByASignalBetweenItsWaitAndTheSweep) {
   time.raised_after_wait = SIGTERM;
   const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
   EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 4);
-  EXPECT_EQ(time.waits.size(), 1U);
+  EXPECT_EQ(time.pauses.size(), 1U);
   EXPECT_FALSE(fs::exists(path("out/axis-1.sweep"))) << "nothing has moved";
 }
 
@@ -251,9 +468,11 @@ TEST_F(Night, AFileThatBreaksMeanwhileIsARowOfTheSummary) {
    public:
     explicit BreakingTime(std::string file) : file_{std::move(file)} {}
     std::int64_t now_s() override { return 1772398800; }
-    bool wait_until(std::int64_t, const std::atomic<int>&, const std::function<void()>&) override {
+    double elapsed_s() override { return 0.0; }
+    bool wait_until(std::int64_t, const std::atomic<int>&, const Meanwhile&) override {
       return true;
     }
+    bool wait_for(double, const std::atomic<int>&, const Meanwhile&) override { return true; }
     void pass(double) override {
       if (!fs::exists(file_)) std::ofstream{file_} << std::string(5000, 'x');
     }
@@ -276,7 +495,8 @@ TEST_F(Night, ThatBeganYesterdayDoesNotWaitForTomorrow) {
   WatchedTime time{1772398800 + 20000};  // the machine was off meanwhile
   const cli::NightOptions options{.job = path("night.toml"), .voice = cli::Voice::quiet};
   EXPECT_EQ(cli::run_night(options, {sim::sim_driver()}, time), 0);
-  EXPECT_EQ(time.waits, (std::vector<std::int64_t>{0}));
+  EXPECT_EQ(time.pauses, (std::vector<double>{0}));
+  EXPECT_THAT(time.waits, testing::IsEmpty());
 }
 
 TEST_F(Night, ASweepStoppedByALimitIsFollowedByTheNextOrNot) {
@@ -380,6 +600,12 @@ TEST_F(Night, RefusesABadJobBeforeAnythingMoves) {
               HasSubstr("error: night.toml:5: [sweeep]: unknown section; did you mean sweep?"));
   EXPECT_THAT(refusal("[[night.sweep]]\nrig = \"none.toml\"\n"),
               HasSubstr("night.toml:4: [night.sweep] rig: none.toml: cannot be read"));
+  EXPECT_THAT(
+      refusal(sweep + "set.loop.clock = \"monotonic\"\n"
+                      "set.loop.cpu = 1023\nset.loop.require_realtime = true\n"),
+      testing::AllOf(HasSubstr("night.toml:7: [loop] require_realtime = true: this machine "
+                               "does not grant:"),
+                     HasSubstr("cpu: CPU 1023 was refused"), HasSubstr("(set for axis.toml)")));
   EXPECT_THAT(refusal(sweep + "pause_s = 1\nset.limits.command_max = 0.1\n"),
               HasSubstr("axis.toml:7: [sweep] amplitude = 0.5"));
 }

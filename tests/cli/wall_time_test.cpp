@@ -54,12 +54,27 @@ TEST(PassingTime, PassesAtOnceAndNeverBack) {
   EXPECT_FALSE(time.wait_until(9000, stop, meanwhile));
 }
 
+TEST(PassingTime, ElapsesAsItPasses) {
+  PassingTime time{1000};
+  const std::atomic<int> none{0};
+  EXPECT_TRUE(time.wait_for(2.5, none, [] {}));
+  EXPECT_TRUE(time.wait_for(-5.0, none, [] {}));
+  time.pass(1.0);
+  EXPECT_EQ(time.elapsed_s(), 3.5);
+  EXPECT_EQ(time.now_s(), 1003);
+}
+
 TEST(SystemTime, WaitsNoLongerThanItIsTold) {
   SystemTime time;
   const std::atomic<int> none{0};
   EXPECT_TRUE(time.wait_until(time.now_s(), none, [] {}));
   const std::atomic<int> stop{1};
   EXPECT_FALSE(time.wait_until(time.now_s() + 1000, stop, [] {}));
+  EXPECT_TRUE(time.wait_for(0.0, none, [] {}));
+  EXPECT_TRUE(time.wait_for(-1000.0, none, [] {}));
+  EXPECT_FALSE(time.wait_for(1000.0, stop, [] {}));
+  const double before_s = time.elapsed_s();
+  EXPECT_LE(before_s, time.elapsed_s());
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include "config/rig.h"
+#include "drivers/modbus/channels.h"
 #include "drivers/modbus/modbus_driver.h"
 
 namespace sinerig::modbus {
@@ -130,6 +131,22 @@ TEST(ModbusConfig, LeavesTimeInThePeriod) {
   EXPECT_EQ(connection.link.period_ns, 2'000'000);
   EXPECT_EQ(connection.link.response_timeout_ns, 1'500'000);
   EXPECT_EQ(connection.link.connection.address(), "h:502");
+}
+
+TEST(ModbusDoubt, IsOfASweepAboveATenthOfTheExchanges) {
+  LinkSettings settings;
+  settings.connection.name = "drive";
+  settings.period_ns = 5'000'000;
+  const Link link{settings, {}};
+  const Pace fast{.exchanges = 100, .median_ns = 1'000'000};
+  EXPECT_EQ(doubt(link, fast, 20.0), "") << "no more exchanges than ticks";
+  EXPECT_THAT(doubt(link, fast, 20.1),
+              HasSubstr("[modbus.drive] 200 exchanges a second, of which the sweep's highest "
+                        "frequency of 20.1 Hz is more than a tenth: above 20 Hz"));
+  const Pace slow{.exchanges = 100, .median_ns = 10'000'000};
+  EXPECT_EQ(doubt(link, slow, 10.0), "");
+  EXPECT_THAT(doubt(link, slow, 12.0), HasSubstr("100 exchanges a second"));
+  EXPECT_EQ(doubt(link, {}, 12.0), "") << "nothing was measured";
 }
 
 }  // namespace

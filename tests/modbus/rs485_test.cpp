@@ -25,6 +25,7 @@ struct Port {
   bool has_rts = false;
   serial_rs485 rs485{};
   std::vector<bool> rts;  // as it was set, in order
+  bool exclusive = false;
 };
 Port port;
 
@@ -50,6 +51,10 @@ extern "C" int ioctl(int fd, unsigned long request, ...) noexcept {
   }
   if (port.has_rts && request == TIOCMSET) {
     port.rts.push_back((*static_cast<int*>(argument) & TIOCM_RTS) != 0);
+    return 0;
+  }
+  if (port.has_rts && (request == TIOCEXCL || request == TIOCNXCL)) {
+    port.exclusive = request == TIOCEXCL;
     return 0;
   }
   return static_cast<int>(syscall(SYS_ioctl, fd, request, argument));
@@ -160,6 +165,30 @@ TEST_F(Rs485Port, IsLeftAloneWhereTheAdapterSwitches) {
   ask(transport);
   EXPECT_EQ(port.rs485.flags & SER_RS485_ENABLED, 0U);
   EXPECT_THAT(port.rts, testing::IsEmpty());
+}
+
+// Two that ask on one line take each other's answers.
+TEST_F(Rs485Port, IsOfOneTransportAtATime) {
+  Transport first{settings(Rs485::adapter)};
+  first.connect();
+  Transport second{settings(Rs485::adapter)};
+  EXPECT_THAT([&] { second.connect(); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(
+                  "[modbus.drive] " + name_ + ": another program has this serial port open")));
+  EXPECT_FALSE(second.connected());
+  EXPECT_TRUE(first.try_connect()) << "again, after a fault";
+  first.disconnect();
+  EXPECT_TRUE(second.try_connect());
+}
+
+// A pseudo-terminal would stay closed to everybody after a crash.
+TEST_F(Rs485Port, IsClosedToProgramsThatKnowNothingOfTheLockWhereItIsARealOne) {
+  port.has_rts = true;
+  Transport transport{settings(Rs485::adapter)};
+  transport.connect();
+  EXPECT_TRUE(port.exclusive);
+  transport.disconnect();
+  EXPECT_FALSE(port.exclusive);
 }
 
 }  // namespace
