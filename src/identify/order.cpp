@@ -38,6 +38,8 @@ constexpr double settled_images = 0.03;
 // nothing to choose it by.
 constexpr int held_iterations = 12;
 constexpr std::size_t most_constrained_fits = 8;
+// Relative residual that no measurement leaves: settling and quantisation alone leave 1e-4.
+constexpr double computed_residual = 1e-5;
 
 class Selector {
  public:
@@ -134,8 +136,8 @@ class Selector {
 
   // A point left out counts as much χ² as it takes to be one.
   double criterion(OrderCandidate candidate, std::size_t outliers) const {
-    candidate.chi2 +=
-        static_cast<double>(outliers) * cost_of_outlier(make_fit_data(response_, 0.0));
+    candidate.chi2 += static_cast<double>(outliers) *
+                      cost_of_outlier(make_fit_data(response_, settings_.fit.model_error));
     return response_has_scatter() && any_explained()
                ? candidate.chi2 + candidate.parameters * penalty()
                : unknown_noise_criterion(candidate);
@@ -159,7 +161,9 @@ class Selector {
 
   double values() const { return static_cast<double>(2 * response_.size()); }
   double penalty() const { return std::log(values()) + competition; }
-  bool response_has_scatter() const { return has_scatter(response_); }
+  bool response_has_scatter() const {
+    return has_scatter(response_) || settings_.fit.model_error > 0.0;
+  }
   int first_order() const { return settings_.poles.value_or(given_); }
   int last_order() const { return settings_.poles.value_or(most_poles_); }
 
@@ -310,10 +314,7 @@ void choose_constrained(const Response& response, const Selector& selector,
   selection.fit = best->second.fit;
 }
 
-}  // namespace
-
-OrderSelection select_order(const Response& response, const OrderSettings& settings) {
-  check_response(response, 3);
+OrderSelection select(const Response& response, const OrderSettings& settings) {
   Selector selector(response, settings);
   selector.sweep_orders();
   if (selector.drop_outliers()) selector.sweep_orders();
@@ -330,6 +331,26 @@ OrderSelection select_order(const Response& response, const OrderSettings& setti
     selection.chosen = selector.options({best.zeros, best.poles, best.origin});
     selection.fit = fit_maximum_likelihood(response, selection.chosen);
   }
+  return selection;
+}
+
+}  // namespace
+
+OrderSelection select_order(const Response& response, const OrderSettings& settings) {
+  check_response(response, 3);
+  OrderSelection unknown = select(response, settings);
+  if (has_scatter(response) || settings.fit.model_error > 0.0 || settings.assumed_scatter == 0.0)
+    return unknown;
+  const double residual = std::sqrt(unknown.fit.chi2 / unknown.fit.degrees_of_freedom);
+  if (residual <= computed_residual) return unknown;
+  OrderSettings assumed = settings;
+  assumed.fit.model_error = settings.assumed_scatter;
+  OrderSelection selection = select(response, assumed);
+  if (!selection.table.front().explained) return unknown;
+  selection.chosen.model_error = 0.0;
+  // Against the median residual, points of uneven noise look like outliers.
+  if (selection.fit.outliers.empty()) selection.chosen.robust = false;
+  selection.fit = fit_maximum_likelihood(response, selection.chosen);
   return selection;
 }
 
