@@ -1,6 +1,7 @@
 #include "identify/order.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -40,6 +41,8 @@ constexpr int held_iterations = 12;
 constexpr std::size_t most_constrained_fits = 8;
 // Relative residual that no measurement leaves: settling and quantisation alone leave 1e-4.
 constexpr double computed_residual = 1e-5;
+// Of the scatter assumed where none is known: the least that explains the points serves.
+constexpr std::array<double, 5> assumed_ladder{1.0, 2.5, 5.0, 10.0, 25.0};
 
 class Selector {
  public:
@@ -344,14 +347,19 @@ OrderSelection select_order(const Response& response, const OrderSettings& setti
   const double residual = std::sqrt(unknown.fit.chi2 / unknown.fit.degrees_of_freedom);
   if (residual <= computed_residual) return unknown;
   OrderSettings assumed = settings;
-  assumed.fit.model_error = settings.assumed_scatter;
-  OrderSelection selection = select(response, assumed);
-  if (!selection.table.front().explained) return unknown;
-  selection.chosen.model_error = 0.0;
-  // Against the median residual, points of uneven noise look like outliers.
-  if (selection.fit.outliers.empty()) selection.chosen.robust = false;
-  selection.fit = fit_maximum_likelihood(response, selection.chosen);
-  return selection;
+  for (const double factor : assumed_ladder) {
+    assumed.fit.model_error = factor * settings.assumed_scatter;
+    OrderSelection selection = select(response, assumed);
+    if (!selection.table.front().explained ||
+        selection.table.front().parameters > unknown.table.front().parameters)
+      continue;
+    selection.chosen.model_error = 0.0;
+    // Against the median residual, points of uneven noise look like outliers.
+    if (selection.fit.outliers.empty()) selection.chosen.robust = false;
+    selection.fit = fit_maximum_likelihood(response, selection.chosen);
+    return selection;
+  }
+  return unknown;
 }
 
 }  // namespace sinerig::identify
