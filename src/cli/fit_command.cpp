@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/fit_methods.h"
 #include "cli/joint_input.h"
+#include "identify/response.h"
 #include "record/fit_store.h"
 #include "report/fit_report.h"
 
