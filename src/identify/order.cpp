@@ -43,6 +43,9 @@ constexpr std::size_t most_constrained_fits = 8;
 constexpr double computed_residual = 1e-5;
 // Of the scatter assumed where none is known: the least that explains the points serves.
 constexpr std::array<double, 5> assumed_ladder{1.0, 2.5, 5.0, 10.0, 25.0};
+// Of what is left with the noise unknown, which took all poles that seemed to help: less explains
+// no model of fewer, and looking for outliers in vain takes seconds.
+constexpr double hopeless = 0.6;
 
 class Selector {
  public:
@@ -349,6 +352,7 @@ OrderSelection select_order(const Response& response, const OrderSettings& setti
   OrderSettings assumed = settings;
   for (const double factor : assumed_ladder) {
     assumed.fit.model_error = factor * settings.assumed_scatter;
+    if (assumed.fit.model_error < hopeless * residual) continue;
     OrderSelection selection = select(response, assumed);
     if (!selection.table.front().explained ||
         selection.table.front().parameters > unknown.table.front().parameters)
