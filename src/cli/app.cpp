@@ -56,7 +56,7 @@ constexpr const char* footer =
 CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
   CLI::App* margins = app.add_subcommand(
       "margins", "Gain, phase and delay margin, crossover, Ms, bandwidth and resonances of a loop");
-  margins->add_option("FILE", options.file, "sweep file or CSV")->required();
+  margins->add_option("FILE", options.file, measured_file)->required();
   margins
       ->add_option("--response", options.response,
                    "what the file is the response of: plant, loop L = PC, sensitivity 1/(1+L) or "
@@ -67,7 +67,7 @@ CLI::App* add_margins(CLI::App& app, MarginsOptions& options) {
   margins->add_flag("--negate", options.negate,
                     "take minus what was measured: a loop measured as control over torque is -L");
   margins->add_option("--controller-file", options.loop.controller_file,
-                      "measured response of the controller, sweep file or CSV");
+                      std::string{"measured response of the controller: "} + measured_file);
   margins->add_option("--channel", options.channel, "sensor of a sweep file (default: the first)");
   margins->add_flag("--points-only", options.points_only, "leave the model out");
   margins->add_flag("--refit", options.refit, "fit anew even if the sweep file holds a fit");
@@ -82,7 +82,8 @@ CLI::App* add_notch(CLI::App& app, NotchOptions& options) {
       "notch", "Design notch filters that hold over the uncertainty and drift of the resonances");
   notch
       ->add_option("FILE", options.files,
-                   "sweep files or CSV; the first is the plant, all show how far it drifts")
+                   std::string{measured_file} +
+                       "; of several the first is the plant, all show how far it drifts")
       ->required();
   notch
       ->add_option("--at", options.at_hz,

@@ -5,13 +5,6 @@
 
 namespace sinerig::cli {
 
-namespace {
-
-constexpr const char* measured_file =
-    "sweep file, or a response measured elsewhere: .csv, .txt, .mat, .uff or .unv";
-
-}  // namespace
-
 CLI::App* add_show(CLI::App& app, ShowOptions& options) {
   CLI::App* show =
       app.add_subcommand("show", "Print a sweep file: how the run went and its points");

@@ -12,6 +12,7 @@
 #include "cli/commands.h"
 #include "cli/fit_methods.h"
 #include "cli/joint_input.h"
+#include "identify/response.h"
 #include "record/fit_store.h"
 #include "report/fit_report.h"
 
@@ -102,6 +103,12 @@ report::FitReport fit_files(const FitCommandOptions& options) {
   for (std::size_t i = 1; i < measured.inputs.size(); ++i)
     report.label += " and " + measured.inputs[i].label;
 
+  if (options.method == "ml" && !measured.response.empty() &&
+      !identify::has_scatter(measured.response) && !(measured.model_error > 0.0))
+    spdlog::warn(
+        "{} holds no scatter: intervals come from the residual of the fit alone; fit --model-error "
+        "says how far the points may be off",
+        options.files.front());
   try {
     if (options.method == "ml")
       fit_by_likelihood(options, measured, report);

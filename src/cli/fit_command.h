@@ -11,7 +11,7 @@
 namespace sinerig::cli {
 
 struct FitCommandOptions {
-  std::vector<std::string> files;  // sweep files or CSV; several are fitted jointly
+  std::vector<std::string> files;  // as read_fit_input takes them; several are fitted jointly
   std::string method = "ml";       // ml hassul choe
   std::optional<int> zeros;        // all zeros
   std::optional<int> poles;        // all poles, those at the origin included

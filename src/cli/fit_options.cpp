@@ -1,12 +1,16 @@
 #include "cli/fit_options.h"
 
+#include <string>
+
+#include "cli/file_arguments.h"
+
 namespace sinerig::cli {
 
 CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
-  CLI::App* fit = app.add_subcommand(
-      "fit",
-      "Identify a transfer function with delay from sweep files or CSV (freq_hz,re,im[,std])");
-  fit->add_option("FILE", options.files, "sweep or CSV files; several are fitted jointly")
+  CLI::App* fit =
+      app.add_subcommand("fit", "Identify a transfer function with delay from responses");
+  fit->add_option("FILE", options.files,
+                  std::string{measured_file} + "; several are fitted jointly")
       ->required();
   fit->add_option("--method", options.method,
                   "ml: maximum likelihood; hassul, choe: the methods of the papers")
@@ -32,8 +36,9 @@ CLI::App* add_fit(CLI::App& app, FitCommandOptions& options) {
   fit->add_option("--given-pole", options.given_poles_rad_s, "a known real pole in rad/s");
   fit->add_option(
       "--model-error", options.model_error,
-      "relative error of the model itself, added to the scatter (default: 0 for CSV; for "
-      "sweep files the least of 0.0001 to 0.002 that explains the residual)");
+      "relative error of the model itself, added to the scatter, or the scatter where a file "
+      "has none (default: for sweep files the least of 0.0001 to 0.002 that explains the "
+      "residual, else 0)");
   fit->add_option("--weights", options.weights.weights,
                   "hassul: none, 1/w, column (the CSV's column \"weight\"), W1,W2,... one per "
                   "point, or a file of one number per line")

@@ -50,9 +50,10 @@ JointInput read_joint_input(const FitCommandOptions& options) {
       throw std::invalid_argument("--hold: the rate must be above zero, or 0 for no hold");
     if (rate_hz > 0.0) measured.hold_period_s = 1.0 / rate_hz;
   }
-  measured.model_error = options.model_error.value_or(sweep ? sweep_model_errors.back() : 0.0);
   measured.choose_model_error =
       sweep && !options.model_error && identify::has_scatter(measured.response);
+  measured.model_error = options.model_error.value_or(
+      measured.choose_model_error ? sweep_model_errors.back() : 0.0);
   return measured;
 }
 

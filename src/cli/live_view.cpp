@@ -55,6 +55,11 @@ LiveView::LiveView(const std::string& address, const config::Rig& rig, const Swe
                      control.stop_requests.fetch_add(1);
                    }},
               run_} {
+  if (rig.clock == config::ClockKind::virtual_time) {
+    spdlog::warn(
+        "--serve: on a virtual clock the run is over at once, and the page with it; clock = "
+        "\"monotonic\" in [loop] runs it in real time");
+  }
   if (!server_.address().loopback()) {
     spdlog::warn("{} can be reached from the network: whoever can may watch, without encryption",
                  server_.address().text());

@@ -8,7 +8,7 @@
 namespace sinerig::cli {
 
 struct MarginsOptions {
-  std::string file;                // sweep file or CSV
+  std::string file;                // what read_fit_input takes
   std::string response = "plant";  // what was measured: plant loop sensitivity complementary
   LoopOptions loop;
   bool negate = false;  // the response was measured with the other sign

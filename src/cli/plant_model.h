@@ -22,7 +22,7 @@ struct PlantModel {
   identify::Curve::Scatter scatter() const;
 };
 
-// FILE is a sweep file or CSV. Its latest maximum-likelihood fit is used; without one, or with
+// FILE is what read_fit_input takes. Its latest maximum-likelihood fit is used; without one, or with
 // refit, it is fitted first with `sinerig fit`'s defaults, and that is said (and stored in a sweep
 // file). hold_hz: rate of the hold the file was measured behind, 0 for none, where the file does
 // not say it or is wrong. A stored fit made with another hold is not used: the model has to be the

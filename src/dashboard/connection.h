@@ -52,6 +52,10 @@ class Connection {
   void send(Time now);
 
   bool streaming() const { return streaming_; }
+  // A stream whose socket takes nothing.
+  bool stalled() const { return streaming_ && !idle(); }
+  Time last_progress() const { return since_; }
+  void abandon() { broken_ = true; }  // over from here on
   bool told_all() const { return ended_ && idle(); }
   // Broken, finished, or without progress for too long.
   bool over(Time now) const;

@@ -33,6 +33,10 @@ using std::chrono::steady_clock;
 constexpr std::chrono::milliseconds status_interval{100};
 constexpr std::chrono::milliseconds idle_interval{1000};
 constexpr std::chrono::milliseconds farewell{500};
+// A stream that has taken nothing for so long makes room for another.
+constexpr std::chrono::seconds stall_patience{2};
+// Each client that is let in is read from before it can lose its place to those behind it.
+constexpr std::size_t most_accepted_at_once = (Server::most_clients - Server::most_streams) / 2;
 
 // Kernel threads and the loop come first, whatever the clients want.
 void step_back() {
@@ -118,7 +122,7 @@ class Server::Loop {
   // Until something arrives, can go out, or is due.
   void wait() {
     std::vector<pollfd> sockets;
-    const bool room = clients_.size() < most_clients && !listener_.exhausted();
+    const bool room = !listener_.exhausted();
     sockets.push_back({.fd = wake_, .events = POLLIN, .revents = 0});
     sockets.push_back({.fd = room ? listener_.socket() : -1, .events = POLLIN, .revents = 0});
     for (const auto& client : clients_)
@@ -137,25 +141,51 @@ class Server::Loop {
   }
 
   void accept_clients(steady_clock::time_point now) {
-    while (clients_.size() < most_clients) {
+    for (std::size_t i = 0; i < most_accepted_at_once; ++i) {
       const int socket = listener_.accept();
       if (socket < 0) return;
+      if (clients_.size() >= most_clients) drop_longest_silent();
       clients_.push_back(std::make_unique<Connection>(socket, now));
     }
+  }
+
+  // Of those that do not follow the run: there always are some.
+  void drop_longest_silent() {
+    const auto before = [](const auto& a, const auto& b) {
+      return a->streaming() != b->streaming() ? b->streaming()
+                                              : a->last_progress() < b->last_progress();
+    };
+    clients_.erase(std::min_element(clients_.begin(), clients_.end(), before));
+  }
+
+  // One more stream may begin; the one that has stalled for longest makes room where there is none.
+  bool room_for_stream(steady_clock::time_point now) {
+    std::size_t streams = 0;
+    Connection* longest = nullptr;
+    for (const auto& client : clients_) {
+      if (!client->streaming() || client->over(now)) continue;
+      ++streams;
+      if (client->stalled() && now - client->last_progress() > stall_patience &&
+          (longest == nullptr || client->last_progress() < longest->last_progress()))
+        longest = client.get();
+    }
+    if (streams < most_streams) return true;
+    if (longest != nullptr) longest->abandon();
+    return longest != nullptr;
   }
 
   void receive(Connection& client, steady_clock::time_point now) {
     HttpRequest request;
     switch (client.receive(now, request)) {
       case Parsed::incomplete: return;
-      case Parsed::complete: return answer(client, request);
+      case Parsed::complete: return answer(client, request, now);
       case Parsed::malformed: return refuse(client, "400 Bad Request", "This is no request.\n");
       case Parsed::too_long:
         return refuse(client, "431 Request Header Fields Too Large", "Too long.\n");
     }
   }
 
-  void answer(Connection& client, const HttpRequest& request) {
+  void answer(Connection& client, const HttpRequest& request, steady_clock::time_point now) {
     if (!host_is_ours(request.host)) {
       return refuse(client, "403 Forbidden",
                     "Open this page by the address that sinerig printed.\n");
@@ -168,6 +198,8 @@ class Server::Loop {
     if (request.path == "/") return client.answer(head("200 OK", "text/html", page_), page_);
     if (request.path == "/run.json")
       return client.answer(head("200 OK", "application/json", run_.head()), run_.head());
+    if (!room_for_stream(now))
+      return refuse(client, "503 Service Unavailable", "Too many pages follow this run.\n");
     const std::string_view since = request.last_event_id.empty()
                                        ? query_value(request.query, "since")
                                        : std::string_view{request.last_event_id};

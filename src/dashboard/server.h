@@ -16,6 +16,10 @@ namespace sinerig::dashboard {
 class Server {
  public:
   static constexpr std::size_t most_clients = 256;
+  // Of them, those that follow the run. The other places are for requests, above all for the one to
+  // stop; whoever connects gets one, and the client that has been silent there for longest loses
+  // it.
+  static constexpr std::size_t most_streams = 64;
 
   struct Settings {
     Address address;

@@ -31,7 +31,9 @@ struct FitOptions {
   double hold_period_s = 0.0;
   std::optional<double> static_gain;              // lim s^origin·G(s) at s = 0
   std::vector<std::complex<double>> given_poles;  // rad/s, in conjugate pairs, not at the origin
-  double model_error = 0.0;    // relative floor added to the scatter, for what the model cannot say
+  // Relative floor added to the scatter, for what the model cannot say; the scatter itself where
+  // the response has none.
+  double model_error = 0.0;
   bool robust = true;          // look for outliers
   bool stable = false;         // poles kept in the left half plane
   bool minimum_phase = false;  // zeros kept in the left half plane

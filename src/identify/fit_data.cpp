@@ -50,7 +50,7 @@ FitData FitData::subset(const std::vector<Index>& chosen) const {
 FitData make_fit_data(const Response& response, double model_error) {
   const auto g = static_cast<Index>(response.size());
   FitData data;
-  data.scatter_known = has_scatter(response);
+  data.scatter_known = has_scatter(response) || model_error > 0.0;
   data.scale = std::sqrt(response.front().omega_rad_s) * std::sqrt(response.back().omega_rad_s);
   for (ArrayXd* array : {&data.omega, &data.x, &data.sigma, &data.w_rr, &data.w_ir, &data.w_ii})
     array->resize(g);

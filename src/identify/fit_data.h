@@ -37,6 +37,7 @@ struct FitData {
 };
 
 // model_error adds a floor to the scatter: a relative standard deviation, added in quadrature.
+// Above zero it is the scatter of a response that has none.
 FitData make_fit_data(const Response& response, double model_error);
 
 // Polynomials N and D by their values on the grid: exact to convert to any basis of their degree.

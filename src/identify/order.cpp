@@ -1,6 +1,7 @@
 #include "identify/order.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <stdexcept>
 
@@ -38,6 +39,13 @@ constexpr double settled_images = 0.03;
 // nothing to choose it by.
 constexpr int held_iterations = 12;
 constexpr std::size_t most_constrained_fits = 8;
+// Relative residual that no measurement leaves: settling and quantisation alone leave 1e-4.
+constexpr double computed_residual = 1e-5;
+// Of the scatter assumed where none is known: the least that explains the points serves.
+constexpr std::array<double, 5> assumed_ladder{1.0, 2.5, 5.0, 10.0, 25.0};
+// Of what is left with the noise unknown, which took all poles that seemed to help: less explains
+// no model of fewer, and looking for outliers in vain takes seconds.
+constexpr double hopeless = 0.6;
 
 class Selector {
  public:
@@ -134,8 +142,8 @@ class Selector {
 
   // A point left out counts as much χ² as it takes to be one.
   double criterion(OrderCandidate candidate, std::size_t outliers) const {
-    candidate.chi2 +=
-        static_cast<double>(outliers) * cost_of_outlier(make_fit_data(response_, 0.0));
+    candidate.chi2 += static_cast<double>(outliers) *
+                      cost_of_outlier(make_fit_data(response_, settings_.fit.model_error));
     return response_has_scatter() && any_explained()
                ? candidate.chi2 + candidate.parameters * penalty()
                : unknown_noise_criterion(candidate);
@@ -159,7 +167,9 @@ class Selector {
 
   double values() const { return static_cast<double>(2 * response_.size()); }
   double penalty() const { return std::log(values()) + competition; }
-  bool response_has_scatter() const { return has_scatter(response_); }
+  bool response_has_scatter() const {
+    return has_scatter(response_) || settings_.fit.model_error > 0.0;
+  }
   int first_order() const { return settings_.poles.value_or(given_); }
   int last_order() const { return settings_.poles.value_or(most_poles_); }
 
@@ -310,10 +320,7 @@ void choose_constrained(const Response& response, const Selector& selector,
   selection.fit = best->second.fit;
 }
 
-}  // namespace
-
-OrderSelection select_order(const Response& response, const OrderSettings& settings) {
-  check_response(response, 3);
+OrderSelection select(const Response& response, const OrderSettings& settings) {
   Selector selector(response, settings);
   selector.sweep_orders();
   if (selector.drop_outliers()) selector.sweep_orders();
@@ -331,6 +338,32 @@ OrderSelection select_order(const Response& response, const OrderSettings& setti
     selection.fit = fit_maximum_likelihood(response, selection.chosen);
   }
   return selection;
+}
+
+}  // namespace
+
+OrderSelection select_order(const Response& response, const OrderSettings& settings) {
+  check_response(response, 3);
+  OrderSelection unknown = select(response, settings);
+  if (has_scatter(response) || settings.fit.model_error > 0.0 || settings.assumed_scatter == 0.0)
+    return unknown;
+  const double residual = std::sqrt(unknown.fit.chi2 / unknown.fit.degrees_of_freedom);
+  if (residual <= computed_residual) return unknown;
+  OrderSettings assumed = settings;
+  for (const double factor : assumed_ladder) {
+    assumed.fit.model_error = factor * settings.assumed_scatter;
+    if (assumed.fit.model_error < hopeless * residual) continue;
+    OrderSelection selection = select(response, assumed);
+    if (!selection.table.front().explained ||
+        selection.table.front().parameters > unknown.table.front().parameters)
+      continue;
+    selection.chosen.model_error = 0.0;
+    // Against the median residual, points of uneven noise look like outliers.
+    if (selection.fit.outliers.empty()) selection.chosen.robust = false;
+    selection.fit = fit_maximum_likelihood(response, selection.chosen);
+    return selection;
+  }
+  return unknown;
 }
 
 }  // namespace sinerig::identify

@@ -15,6 +15,10 @@ struct OrderSettings {
   int most_poles = 16;
   int most_origin = 2;           // poles at the origin tried: 0 … most_origin
   int most_relative_degree = 4;  // poles − zeros tried: 0 … this
+  // Relative standard deviation that the points of a response without scatter are taken to have,
+  // and the least of several times that by which some model explains them: the error that sweeps
+  // are allowed for their order. 0: none.
+  double assumed_scatter = 2e-3;
   // Parts that are known; the others are chosen.
   std::optional<int> zeros;
   std::optional<int> poles;
@@ -44,7 +48,11 @@ struct OrderSelection {
 // parameters, g points); where nothing is explained, or the scatter is unknown,
 // 2g·ln(χ²/2g) + p·(ln(2g) + 4), the same with the noise unknown. χ² is that of the model with its
 // hold and within its constraints; structures that only a constraint holds come last.
-// Throws std::invalid_argument as fit_maximum_likelihood does, and when no order is possible.
+// Without scatter or a model error, settings.assumed_scatter stands in for it, unless nothing is
+// explained by it or a model follows the points so closely that they were computed; the fit
+// returned knows of no scatter. Real noise is uneven, and poles are a cheap way to follow the
+// points where it is large: the noise unknown asked for 8 poles of a motor that has 3. Throws
+// std::invalid_argument as fit_maximum_likelihood does, and when no order is possible.
 OrderSelection select_order(const Response& response, const OrderSettings& settings);
 
 }  // namespace sinerig::identify

@@ -22,6 +22,8 @@ constexpr double width = 960.0;
 constexpr double height = 860.0;
 constexpr double left = 78.0;
 constexpr double right = width - 24.0;
+// Of an axis, dB and degrees: far above rounding and a hundredth of what any bench resolves.
+constexpr double least_span = 1e-3;
 using record::degrees_per_radian;
 
 double db(double value) {
@@ -116,13 +118,13 @@ void write_bode_svg(std::ostream& stream, const LabelledRun& labelled,
          << "<text x=\"24\" y=\"57\" fill=\"#5b636c\">" << xml_text(about_run(run)) << "</text>";
 
   SvgPanel gain{stream, x, {.top = 92, .bottom = 392}, "Gain, dB re " + unit};
-  gain.range(curves.gain_db, {.logarithmic = false, .angle = false});
+  gain.range(curves.gain_db, {.logarithmic = false, .angle = false, .least_span = least_span});
   gain.band(curves.frequency_hz, curves.gain_low, curves.gain_high, series);
   gain.line(curves.frequency_hz, curves.gain_db, series);
   gain.marks(curves.frequency_hz, curves.gain_db, curves.status, series);
 
   SvgPanel phase{stream, x, {.top = 440, .bottom = 660}, "Phase, degrees"};
-  phase.range(curves.phase_deg, {.logarithmic = false, .angle = true});
+  phase.range(curves.phase_deg, {.logarithmic = false, .angle = true, .least_span = least_span});
   phase.band(curves.frequency_hz, curves.phase_low, curves.phase_high, series);
   phase.line(curves.frequency_hz, curves.phase_deg, series);
   phase.marks(curves.frequency_hz, curves.phase_deg, curves.status, series);
@@ -134,7 +136,7 @@ void write_bode_svg(std::ostream& stream, const LabelledRun& labelled,
                    "Half-width of the 95 % interval: gain in dB (blue), phase in degrees (orange)"};
   std::vector<double> both = curves.gain95_db;
   both.insert(both.end(), curves.phase95_deg.begin(), curves.phase95_deg.end());
-  width95.range(both, {.logarithmic = true, .angle = false});
+  width95.range(both, {.logarithmic = true, .angle = false, .least_span = 0.0});
   width95.line(curves.frequency_hz, curves.gain95_db, {.stroke = "#1f66c1", .width = 1.3});
   width95.line(curves.frequency_hz, curves.phase95_deg, {.stroke = "#c8500f", .width = 1.3});
   stream << "</svg>\n";

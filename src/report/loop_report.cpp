@@ -1,5 +1,6 @@
 #include "report/loop_report.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ostream>
@@ -19,8 +20,19 @@ std::string format(const char* pattern, Values... values) {
   return text;
 }
 
-std::string interval_text(const Bounded& figure, double unit = 1.0) {
-  if (!std::isfinite(figure.low) || !std::isfinite(figure.high))
+// What may be near zero and well known for all that: half-widths up to here say something.
+constexpr double telling_db = 20.0;
+constexpr double telling_deg = 90.0;
+
+// One wider than its value says nothing, and none of no width at all was ever measured: points
+// without scatter have those.
+bool interval_known(const Bounded& figure, double telling) {
+  const double half = 0.5 * (figure.high - figure.low);
+  return std::isfinite(half) && half > 0.0 && half <= std::max(std::abs(figure.value), telling);
+}
+
+std::string interval_text(const Bounded& figure, double unit = 1.0, double telling = 0.0) {
+  if (!interval_known(figure, telling))
     return format("%10.5g  (interval not known)", figure.value * unit);
   return format("%10.5g  (%.5g to %.5g)", figure.value * unit, figure.low * unit,
                 figure.high * unit);
@@ -32,9 +44,9 @@ std::string between_text(const Between& between) {
 }
 
 void print_line(std::ostream& stream, const char* name, const Bounded& figure, double at_hz,
-                const Between& between, double unit = 1.0) {
-  stream << format("  %-22s", name) << interval_text(figure, unit) << format("  at %.5g Hz", at_hz)
-         << between_text(between) << '\n';
+                const Between& between, double unit = 1.0, double telling = 0.0) {
+  stream << format("  %-22s", name) << interval_text(figure, unit, telling)
+         << format("  at %.5g Hz", at_hz) << between_text(between) << '\n';
 }
 
 Json bounded_json(const Bounded& figure) {
@@ -87,7 +99,8 @@ void print_loop(std::ostream& stream, const std::string& title,
   stream << '\n';
   const auto gain = [&](const char* name, const std::optional<identify::GainMargin>& figure) {
     if (figure)
-      print_line(stream, name, figure->margin_db, figure->frequency_hz.value, figure->between_hz);
+      print_line(stream, name, figure->margin_db, figure->frequency_hz.value, figure->between_hz,
+                 1.0, telling_db);
     else
       stream << format("  %-22s      none, the phase does not cross 180° up to %.5g Hz\n", name,
                        figures.searched_to_hz);
@@ -98,7 +111,7 @@ void print_loop(std::ostream& stream, const std::string& title,
     const identify::PhaseMargin& phase = *figures.phase_margin;
     const identify::PhaseMargin& delay = *figures.delay_margin;
     print_line(stream, "phase margin, deg", phase.margin_deg, phase.frequency_hz.value,
-               phase.between_hz);
+               phase.between_hz, 1.0, telling_deg);
     print_line(stream, "delay margin, ms", delay.delay_s, delay.frequency_hz.value,
                delay.between_hz, 1e3);
   } else {
@@ -115,7 +128,8 @@ void print_loop(std::ostream& stream, const std::string& title,
     stream << format("  %-22s", "bandwidth of T, Hz") << interval_text(*figures.bandwidth_hz)
            << between_text(figures.bandwidth_between_hz) << '\n';
   for (const identify::Resonance& each : figures.resonances)
-    print_line(stream, "resonance, dB", each.gain_db, each.frequency_hz, each.between_hz);
+    print_line(stream, "resonance, dB", each.gain_db, each.frequency_hz, each.between_hz, 1.0,
+               telling_db);
 }
 
 Json loop_json(const identify::LoopFigures& figures, std::optional<bool> stable) {

@@ -52,14 +52,21 @@ std::array<long long, 5> integers_of(const identify::FixedBiquad& fixed) {
   return out;
 }
 
+// An interval wider than its value is cut off just above zero.
+std::string damping_text(const identify::UncertainMode& mode) {
+  if (mode.damping_low < 1e-3 * mode.damping_high)
+    return format("damping not known, %.4g at most", mode.damping_high);
+  return format("damping %.4g to %.4g", mode.damping_low, mode.damping_high);
+}
+
 void print_one(std::ostream& stream, const DesignedNotch& each) {
   const identify::NotchDesign& design = each.design;
   const identify::Notch& notch = design.notch;
   stream << format("notch at %.6g Hz, depth %.4g dB, width %.4g Hz (damping %.5g over %.5g)\n",
                    notch.frequency_hz, notch.depth_db(), notch.width_hz(), notch.zero_damping,
                    notch.pole_damping)
-         << format("  resonance      %.6g to %.6g Hz, damping %.4g to %.4g\n", each.mode.low_hz,
-                   each.mode.high_hz, each.mode.damping_low, each.mode.damping_high)
+         << format("  resonance      %.6g to %.6g Hz, ", each.mode.low_hz, each.mode.high_hz)
+         << damping_text(each.mode) << '\n'
          << format("  attenuation    %.4g dB at least over that interval, %.4g dB wanted\n",
                    design.worst_attenuation_db, each.request.attenuation_db)
          << format("  phase cost     %.4g deg at %.5g Hz\n", design.phase_cost_deg,

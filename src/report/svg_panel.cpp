@@ -54,8 +54,9 @@ void SvgPanel::range(const std::vector<double>& values, Scale scale) {
     const double rounding = 1e-9 * std::max(std::abs(low), std::abs(high));
     const double margin =
         high > low ? std::max(0.07 * (high - low), rounding) : std::max(0.1 * std::abs(high), 1e-9);
-    y_.low = low - margin;
-    y_.high = high + margin;
+    const double more = std::max(0.0, 0.5 * (scale.least_span - (high - low)) - margin);
+    y_.low = low - margin - more;
+    y_.high = high + margin + more;
   }
   const double rows = std::max(2.0, std::floor((y_.from - y_.to) / 32.0));
   const double step = scale.logarithmic ? 0.0

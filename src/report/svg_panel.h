@@ -22,7 +22,8 @@ class SvgPanel {
   };
   struct Scale {
     bool logarithmic = false;
-    bool angle = false;  // ticks at 15, 30, 45, 90 …
+    bool angle = false;       // ticks at 15, 30, 45, 90 …
+    double least_span = 0.0;  // of a linear axis: what differs by less is the same
   };
 
   // `x` in Hz. The stream must outlive the panel.

@@ -89,6 +89,27 @@ TEST_F(FitCommand, ChoosesTheOrderByItselfAndShowsTheCandidates) {
   EXPECT_GT(model.at("candidates").size(), 1U);
 }
 
+// The same figures as those of a file that says so at every point.
+TEST_F(FitCommand, TakesTheModelErrorForTheScatterWhereThereIsNone) {
+  std::string bare = lag_csv();
+  std::string cut;
+  for (std::size_t begin = 0; begin < bare.size(); begin = bare.find('\n', begin) + 1)
+    cut += bare.substr(begin, bare.rfind(',', bare.find('\n', begin)) - begin) + "\n";
+  const auto with = fit(lag_csv(), "--zeros 0 --poles 1 --json");
+  const auto without = fit(cut, "--zeros 0 --poles 1 --json --model-error 1e-3");
+  ASSERT_EQ(without.exit_code, 0) << without.errors;
+  EXPECT_EQ(without.errors, "");
+  const json expected = json::parse(with.output);
+  const json model = json::parse(without.output);
+  EXPECT_TRUE(model["scatter_known"].get<bool>());
+  EXPECT_EQ(model["model_error"], 1e-3);
+  const double error = expected["delay_standard_error"].get<double>();
+  EXPECT_NEAR(model["delay_standard_error"].get<double>(), error, 1e-3 * error);
+  const auto silent = fit(cut, "--zeros 0 --poles 1 --json");
+  EXPECT_THAT(silent.errors, HasSubstr("response.csv holds no scatter: intervals come from"));
+  EXPECT_FALSE(json::parse(silent.output)["scatter_known"].get<bool>());
+}
+
 TEST_F(FitCommand, FitsSeveralFilesJointlyAndTakesAKnownDelay) {
   workshop_.write("again.csv", lag_csv());
   const auto run = fit(lag_csv(), "again.csv --zeros 0 --poles 1 --delay 0.002 --json");

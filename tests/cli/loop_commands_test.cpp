@@ -349,6 +349,46 @@ TEST(MarginsCommand, CountsTheHoldOfAnExportedResponseOnce) {
   EXPECT_NEAR(margin("axis.sweep"), of_sweep, 0.05);
 }
 
+// Other programs write no scatter. Taken for noise that is the same everywhere, what noise there is
+// was followed with 8 poles, and the notch sat on one of them at 30.6 Hz; the second asked for 11.
+TEST(NotchCommand, IsTheSameWithoutScatter) {
+  struct Rig {
+    std::string name, channel;
+    std::size_t poles;
+  };
+  for (const Rig& rig : {Rig{"two-mass", "motor", 3}, Rig{"gimbal", "encoder", 7}}) {
+    SCOPED_TRACE(rig.name);
+    const test::Workshop workshop;
+    const auto write = [&](const std::string& command) {
+      const auto run = workshop.sinerig(command);
+      ASSERT_EQ(run.exit_code, 0) << run.errors;
+    };
+    write("run " + config + rig.name + ".toml -o axis.sweep --no-report");
+    write("export axis.sweep --channel " + rig.channel + " -o axis.csv");
+    write("export axis.sweep --channel " + rig.channel + " --format uff -o axis.uff");
+    ASSERT_EQ(workshop.shell("cut -d, -f1-3 axis.csv > bare.csv").exit_code, 0);
+    const auto frequency_hz = [&](const std::string& file) {
+      const auto run = workshop.sinerig("notch --json " + file);
+      EXPECT_EQ(run.exit_code, 0) << run.errors;
+      const std::string warning = file + " holds no scatter";
+      const std::size_t at = run.errors.find(warning);
+      EXPECT_EQ(at != std::string::npos, file != "axis.sweep") << run.errors;
+      EXPECT_EQ(run.errors.rfind(warning), at) << "said twice";
+      return json::parse(run.output)["notches"][0]["frequency_hz"].get<double>();
+    };
+    const double of_sweep_hz = frequency_hz("axis.sweep");
+    EXPECT_NEAR(frequency_hz("axis.uff"), of_sweep_hz, 0.01 * of_sweep_hz);
+    EXPECT_NEAR(frequency_hz("bare.csv"), of_sweep_hz, 0.01 * of_sweep_hz);
+    const auto fit = workshop.sinerig("fit --json axis.uff");
+    ASSERT_EQ(fit.exit_code, 0) << fit.errors;
+    EXPECT_EQ(json::parse(fit.output)["poles"].size(), rig.poles);
+    // Points that nobody knows the scatter of have no interval of no width.
+    const auto margins = workshop.sinerig("margins --points-only axis.uff");
+    EXPECT_THAT(margins.output, HasSubstr("(interval not known)"));
+    EXPECT_THAT(margins.output, Not(testing::ContainsRegex("[0-9] to [0-9]")));
+  }
+}
+
 TEST(MarginsCommand, TakesALoopThatWasMeasuredWithTheOtherSign) {
   const test::Workshop workshop;
   ASSERT_EQ(

@@ -55,6 +55,7 @@ TEST_F(Serve, ServingChangesNoNumberAndStoresNoSample) {
   const auto served = run({"run", "--serve", ":0", "fast.toml", "-o", "served.sweep"});
   ASSERT_EQ(served.code, 0) << served.err;
   EXPECT_EQ(run({"export", "plain.sweep"}).out, run({"export", "served.sweep"}).out);
+  EXPECT_THAT(served.err, HasSubstr("on a virtual clock the run is over at once"));
 }
 
 TEST_F(Serve, RefusesAnAddressBeforeAnythingMoves) {

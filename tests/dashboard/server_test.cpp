@@ -209,6 +209,30 @@ TEST_F(ServerTest, StalledReaderHoldsUpNobody) {
   EXPECT_TRUE(reader.wait_for("event: end"));
 }
 
+// Whoever follows, or sits there, and however many do: a stop gets through.
+class CrowdedServerTest : public ServerTest, public testing::WithParamInterface<int> {};
+
+TEST_P(CrowdedServerTest, StopsAndAnswersBesideStreamsThatNobodyReads) {
+  std::vector<std::unique_ptr<HttpClient>> streams;
+  for (std::size_t i = 0; i < Server::most_streams; ++i) {
+    streams.push_back(std::make_unique<HttpClient>(port(), GetParam()));
+    streams.back()->get("/events?since=0");
+    ASSERT_TRUE(streams.back()->wait_for("text/event-stream")) << i;
+  }
+  test::run_served(plan_, control_, &live_, lateness_);
+  EXPECT_EQ(HttpClient{port()}.get("/events?since=0").status(), "503");
+  std::vector<std::unique_ptr<HttpClient>> silent;
+  for (std::size_t i = 0; i < Server::most_clients; ++i)
+    silent.push_back(std::make_unique<HttpClient>(port()));
+  EXPECT_EQ(
+      HttpClient{port()}.post("/stop", std::string{"X-Sinerig-Token: "} + token + "\r\n").status(),
+      "204");
+  EXPECT_EQ(control_.stop_requests.load(), 1);
+  EXPECT_EQ(HttpClient{port()}.get("/").status(), "200");
+}
+
+INSTANTIATE_TEST_SUITE_P(ReceiveBuffers, CrowdedServerTest, testing::Values(0, 2048));
+
 TEST_F(ServerTest, SaysWhichAddressIsTaken) {
   LiveRun other{test::served_setup(plan_), lateness_};
   try {

@@ -50,6 +50,34 @@ TEST(Order, IsFoundWithoutKnowingTheScatter) {
   EXPECT_NEAR(std::sqrt(selection.fit.chi2 / selection.fit.degrees_of_freedom), 0.01, 0.002);
 }
 
+// Noise that is ten times larger here than there, as on every bench, is not followed with poles.
+TEST(Order, IsFoundWithoutKnowingAScatterThatIsUneven) {
+  const ZerosPolesGain motor =
+      to_zeros_poles_gain({{250.0, 1875.0, 1.25e7}, {1.0, 22.5, 150062.5, 500000.0}, 0.00075});
+  const std::vector<double> grid =
+      log_grid(2.0 * std::numbers::pi, 2.0 * std::numbers::pi * 250.0, 50);
+  OrderSettings settings;
+  settings.fit.delay = Delay::fit;
+  for (const double largest : {1e-3, 3e-3, 1e-2}) {
+    for (unsigned seed = 1; seed <= 4; ++seed) {
+      SCOPED_TRACE("largest " + std::to_string(largest) + ", seed " + std::to_string(seed));
+      Random random(seed);
+      std::uniform_real_distribution<double> decade(-1.0, 0.0);
+      std::normal_distribution<double> normal;
+      Response response = exact_response(motor, grid);
+      for (ResponsePoint& point : response) {
+        const double size = largest * std::pow(10.0, decade(random)) * std::abs(point.response);
+        point.response += size * std::complex<double>{normal(random), normal(random)};
+      }
+      const OrderSelection selection = select_order(response, settings);
+      EXPECT_EQ(selection.chosen.poles, 3);
+      EXPECT_TRUE(selection.fit.outliers.empty());
+      EXPECT_FALSE(selection.fit.scatter_known);
+      EXPECT_EQ(selection.chosen.model_error, 0.0);
+    }
+  }
+}
+
 TEST(Order, IsExactOnExactData) {
   const OrderSelection selection = select_order(exact_response(choe_example_3(), choe_grid()), {});
   EXPECT_EQ(selection.chosen.poles, 3);

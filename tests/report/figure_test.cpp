@@ -59,6 +59,18 @@ TEST(Figure, DrawsAGainThatIsConstantUpToRounding) {
   EXPECT_LT(stream.str().size(), 100'000U);
 }
 
+// The rounding of one is no gain: the axis does not go into it.
+TEST(Figure, DrawsAGainOfOneAsALine) {
+  LabelledRun run{.label = "flat", .run = test::two_channel_run(20)};
+  for (record::StoredPoint& point : run.run.responses.front().points) {
+    point.response = point.dwell % 2 == 0 ? 1.0 : std::nextafter(1.0, 2.0);
+    point.dof = 0.0;
+  }
+  std::ostringstream stream;
+  write_bode_svg(stream, run, run.run.responses.front());
+  EXPECT_EQ(occurrences(stream.str(), "10⁻"), 0U);
+}
+
 TEST(Figure, BecomesAPng) {
   if (!has_raster()) {
     EXPECT_THROW(png_from_svg(picture(10), 1.0), std::runtime_error);

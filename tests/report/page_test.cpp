@@ -245,6 +245,52 @@ TEST_F(Page, DrawsAPhaseThatIsConstantUpToRounding) {
   expect_no_errors();
 }
 
+// Without a least span the axis of a gain of one went from −8e-9 to 8e-9 dB, and drew the rounding.
+TEST_F(Page, DrawsAGainOfOneAsALine) {
+  LabelledRun run = run_of(30);
+  for (record::StoredPoint& point : run.run.responses.front().points) {
+    point.response = point.dwell % 2 == 0 ? 1.0 : std::nextafter(1.0, 2.0);
+    point.dof = 0.0;
+  }
+  show(run);
+  const auto highest_label = [&](const std::string& id) {
+    return browser_->evaluate("Math.max(...[...document.querySelectorAll('#" + id +
+                              " svg text')].filter(t => t.getAttribute('text-anchor') === 'end')"
+                              ".map(t => parseFloat(t.textContent)).filter(Number.isFinite))");
+  };
+  EXPECT_EQ(highest_label("gain"), 4e-4);
+  EXPECT_EQ(highest_label("phase"), 4e-4);
+  press("absolute");
+  EXPECT_GT(highest_label("gain").get<double>(), 1.0);
+  expect_no_errors();
+}
+
+// Where the phase jumps a turn the band of its interval ends and begins anew, as the curve does.
+TEST_F(Page, SplitsTheBandOfAWrappedPhase) {
+  LabelledRun run = run_of(40);
+  for (record::StoredPoint& point : run.run.responses.front().points)
+    point.response = std::polar(std::abs(point.response), -0.4 * point.dwell);
+  run.run.fits = {test::lag_fit()};
+  run.run.fits.front().delay_s = 0.02;
+  show(run);
+  // The highest step between neighbours along the bands, as a part of the plot's height.
+  const std::string highest_step =
+      "(h => Math.max(...[...document.querySelectorAll('#phase .band')].flatMap(band =>"
+      " band.getAttribute('d').split('Z').flatMap(piece => {"
+      " const ys = piece.split(/[ML]/).slice(1).map(p => +p.split(' ')[1]);"
+      " return ys.slice(1).map((y, i) => Math.abs(y - ys[i]) / h); }))))"
+      "(document.querySelector('#phase .frame').getBBox().height)";
+  const std::string bands =
+      "[...document.querySelectorAll('#phase .band')].map(b => "
+      "b.getAttribute('d').split('M').length"
+      " - 1)";
+  EXPECT_EQ(browser_->evaluate(bands), nlohmann::json::array({1}));
+  press("wrapped");
+  EXPECT_LT(browser_->evaluate(highest_step).get<double>(), 0.5);
+  for (const auto& pieces : browser_->evaluate(bands)) EXPECT_GE(pieces.get<int>(), 2);
+  expect_no_errors();
+}
+
 TEST_F(Page, FitsANarrowWindow) {
   show(run_of(40), 390, 800);
   EXPECT_LE(browser_->evaluate("document.documentElement.scrollWidth").get<int>(), 390)

@@ -13,8 +13,11 @@ namespace sinerig::test {
 
 class HttpClient {
  public:
-  explicit HttpClient(std::uint16_t port)
+  // receive_buffer: bytes, that a client that does not read fills soon; 0: the system's.
+  explicit HttpClient(std::uint16_t port, int receive_buffer = 0)
       : socket_{::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)} {
+    if (receive_buffer > 0)
+      setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &receive_buffer, sizeof receive_buffer);
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(port);

@@ -243,6 +243,8 @@ function follow() {
   });
   source.addEventListener('error', () => {
     live.lost = true;
+    // Refused, for too many follow: the browser does not try again by itself.
+    if (source.readyState === EventSource.CLOSED && live.source === source) setTimeout(follow, patience);
     schedule();
   });
 }

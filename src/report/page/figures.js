@@ -2,11 +2,16 @@
 
 const range = (lo, hi, f) => Array.from({ length: hi - lo }, (_, i) => f(lo + i));
 
+// Of an axis of gain in dB and of phase in degrees, as in the pictures: far above rounding and a
+// hundredth of what any bench resolves.
+const leastSpan = 1e-3;
+
 function measured(values, band) {
   return shownResponses().flatMap(r => {
     const y = values(r);
     const layers = [];
-    if (band) layers.push({ style: colour(r), f: r.f, low: band.low(r), high: band.high(r) });
+    if (band)
+      layers.push({ style: colour(r), f: r.f, low: band.low(r), high: band.high(r), jump: band.jump });
     layers.push({
       style: colour(r),
       f: r.f,
@@ -47,6 +52,7 @@ function gainPlot() {
   return {
     id: 'gain',
     height: 300,
+    least: () => leastSpan,
     legend: statusLegend,
     title: () => 'Gain',
     log: () => !state.db,
@@ -74,6 +80,7 @@ function phasePlot() {
     id: 'phase',
     height: 240,
     angle: true,
+    least: () => inPhase((leastSpan * turn) / 360),
     title: () => 'Phase',
     unit: () =>
       (state.degrees ? 'degrees' : 'rad') + (state.wrapped ? ', within half a turn' : ', continuous'),

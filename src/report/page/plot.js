@@ -26,19 +26,13 @@ const curvePath = (xs, ys, jump = Infinity) =>
     .map(p => 'M' + join(p))
     .join('');
 
-function bandPath(xs, lows, highs) {
-  const upper = pieces(
-    xs,
-    highs.map((v, i) => (lows[i] === null ? null : v)),
-    Infinity,
-  );
-  const lower = pieces(
-    xs,
-    lows.map((v, i) => (highs[i] === null ? null : v)),
-    Infinity,
-  );
-  return upper
-    .map((p, i) => (p.length < 2 ? '' : 'M' + join(p) + 'L' + join(lower[i].slice().reverse()) + 'Z'))
+// A band has the gaps and the jumps of its middle.
+function bandPath(xs, lows, highs, jump = Infinity) {
+  const indices = xs.map((_, i) => i);
+  const middles = indices.map(i => (lows[i] === null || highs[i] === null ? null : (lows[i] + highs[i]) / 2));
+  const edge = (piece, ys) => piece.map(([i]) => [xs[i], ys[i]]);
+  return pieces(indices, middles, jump)
+    .map(p => (p.length < 2 ? '' : `M${join(edge(p, highs))}L${join(edge(p, lows).reverse())}Z`))
     .join('');
 }
 
@@ -75,7 +69,7 @@ function markPaths(xs, ys, statuses, radius) {
 }
 
 class Plot {
-  // spec: {id, title, unit(), height, log, layers(), label(v), angle, zero}; a layer is
+  // spec: {id, title, unit(), height, log, layers(), label(v), angle, zero, least()}; a layer is
   // {style, f, y, low, high, line, marks, status, bars}, values in the units chosen.
   constructor(host, spec) {
     this.spec = spec;
@@ -102,6 +96,9 @@ class Plot {
     const log = typeof spec.log === 'function' ? spec.log() : spec.log;
     let [lo, hi] = extent(inView, log);
     if (spec.clamp) [lo, hi] = spec.clamp(lo, hi, layers, f0, f1);
+    // What differs by less is the same.
+    const least = log || !spec.least ? 0 : spec.least();
+    if (hi - lo < least) [lo, hi] = [(lo + hi - least) / 2, (lo + hi + least) / 2];
     const bottom = height - margin.bottom;
     const y = (this.y = (log ? logScale : linearScale)(lo, hi, bottom, margin.top));
     const title = spec.title();
@@ -172,11 +169,11 @@ class Plot {
   layer(l, bottom) {
     const xs = l.f.map(this.x),
       to = v => (v === null || !Number.isFinite(v) || (this.y.log && v <= 0) ? null : this.y(v));
+    const jump = l.jump ? Math.abs(this.y(l.jump) - this.y(0)) : Infinity;
     let html = '';
     if (l.low)
-      html += `<path class="band ${l.neutral ? 'neutral' : ''}" d="${bandPath(xs, l.low.map(to), l.high.map(to))}"/>`;
-    if (l.y && l.line)
-      html += `<path class="curve ${l.line}" d="${curvePath(xs, l.y.map(to), l.jump ? Math.abs(this.y(l.jump) - this.y(0)) : Infinity)}"/>`;
+      html += `<path class="band ${l.neutral ? 'neutral' : ''}" d="${bandPath(xs, l.low.map(to), l.high.map(to), jump)}"/>`;
+    if (l.y && l.line) html += `<path class="curve ${l.line}" d="${curvePath(xs, l.y.map(to), jump)}"/>`;
     if (l.y && l.bars)
       html += `<path class="curve" d="${xs.map((x, i) => (to(l.y[i]) === null ? '' : `M${x.toFixed(1)} ${bottom}V${to(l.y[i]).toFixed(1)}`)).join('')}"/>`;
     if (l.y && l.marks) {
