@@ -28,9 +28,11 @@ std::string changed_include(const record::StoredRun& run, const config::Rig& rig
   const std::string before = run.fact("included");
   if (before.empty()) return {};
   for (const auto& [path, digest] : rig.file->included()) {
+    // A folder that was moved holds the same files.
     std::istringstream lines{before};
     bool same = false;
-    for (std::string line; std::getline(lines, line);) same = same || line == line_of(path, digest);
+    for (std::string line; std::getline(lines, line);)
+      same = same || line.starts_with(digest + ",");
     if (!same) return path;
   }
   return {};

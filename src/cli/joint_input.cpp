@@ -52,8 +52,8 @@ JointInput read_joint_input(const FitCommandOptions& options) {
   }
   measured.choose_model_error =
       sweep && !options.model_error && identify::has_scatter(measured.response);
-  measured.model_error = options.model_error.value_or(
-      measured.choose_model_error ? sweep_model_errors.back() : 0.0);
+  measured.model_error =
+      options.model_error.value_or(measured.choose_model_error ? sweep_model_errors.back() : 0.0);
   return measured;
 }
 

@@ -197,9 +197,12 @@ int Night::sweep_patiently(const NightTask& task, TaskState state) {
     } catch (const DevicesFailed& failure) {
       const RetrySettings retry = configured_rig(task, drivers_)->rig().runner.retry;
       if (failed == retry.faults) {
-        if (failed == 0) throw;
-        throw DevicesFailed{std::string{failure.what()} + " (" + std::to_string(failed) +
-                            " tries to begin again are spent, [retry])"};
+        std::string what = failure.what();
+        if (failed > 0)
+          what += " (" + std::to_string(failed) + " tries to begin again are spent, [retry])";
+        // The next rig is not moved beside a drive that may still be on.
+        if (!failure.not_released().empty()) throw NotToBeArmed{what};
+        throw DevicesFailed{what};
       }
       notes_[task.sweep_file] =
           "begun at try " + std::to_string(failed + 2) + ": " + failure.what();

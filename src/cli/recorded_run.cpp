@@ -78,7 +78,7 @@ std::string reason_not_to_begin() {
 }
 
 template <class Work>
-void of_devices(Work work) {
+void of_devices(ConfiguredRig& configured, Work work) {
   try {
     work();
   } catch (const StopRequested&) {
@@ -88,7 +88,9 @@ void of_devices(Work work) {
   } catch (const config::ConfigError&) {
     throw;
   } catch (const std::exception& failure) {
-    throw DevicesFailed{failure.what()};
+    configured.keep_released();
+    const std::string missing = configured.not_released();
+    throw DevicesFailed{failure.what() + (missing.empty() ? "" : "; " + missing), missing};
   }
 }
 
@@ -203,7 +205,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
   std::unique_ptr<SweepRunner> runner;
   bool to_measure = true;
   try {
-    of_devices([&] { attended(service, waiting, [&] { configured.open(); }); });
+    of_devices(configured, [&] { attended(service, waiting, [&] { configured.open(); }); });
     runner = std::make_unique<SweepRunner>(plan, settings, view ? view->clock() : clock,
                                            configured.actuator(), configured.sensors(), guard,
                                            outbox, &configured);
@@ -213,7 +215,8 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
       teller.resume(earlier->finished.points);
       if (view) view->run().resume(earlier->finished);
     }
-    if (to_measure) of_devices([&] { attended(service, waiting, [&] { configured.arm(); }); });
+    if (to_measure)
+      of_devices(configured, [&] { attended(service, waiting, [&] { configured.arm(); }); });
     writer->begin_part(earlier != nullptr ? earlier->start : record::PartStart{});
     if (earlier != nullptr && !modes && without_review(plan, *runner, earlier->finished)) {
       writer->write(Event{.kind = EventKind::model_doubted,
@@ -225,7 +228,7 @@ int record_run(ConfiguredRig& configured, const SweepPlan& plan, const RecordedR
           writer->path());
     }
     // The disk may have taken longer than a queue of the kernel lasts.
-    if (to_measure) of_devices([&] { configured.catch_up(); });
+    if (to_measure) of_devices(configured, [&] { configured.catch_up(); });
   } catch (...) {
     writer->discard();
     if (control.stop_requests.load() == 0) throw;

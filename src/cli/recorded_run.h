@@ -7,6 +7,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "cli/commands.h"
 #include "cli/configured_rig.h"
@@ -18,7 +19,14 @@ namespace sinerig::cli {
 // The devices cannot be opened or armed: the drive is off, or boots. What passes by itself.
 class DevicesFailed : public std::runtime_error {
  public:
-  using std::runtime_error::runtime_error;
+  explicit DevicesFailed(const std::string& what, std::string not_released = {})
+      : std::runtime_error{what}, not_released_{std::move(not_released)} {}
+
+  // What the drive has not taken, and may still be on for; empty where it is released.
+  const std::string& not_released() const { return not_released_; }
+
+ private:
+  std::string not_released_;
 };
 
 struct RecordedRunOptions {

@@ -152,7 +152,10 @@ bool SweepRunner::go_on(const FinishedDwells& finished) {
 void SweepRunner::begin_dwell(std::uint64_t tick) noexcept {
   const Dwell& dwell = next_to_measure();
   if (!scale_chosen_) {
-    scale_ = leveller_.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
+    // Whatever the points of an earlier part have taught: they may be decades away.
+    const Leveller unknowing{plan_.level};
+    const Leveller& leveller = preflight_ ? unknowing : leveller_;
+    scale_ = leveller.scale(dwell.frequency_hz(plan_.rate_hz), dwell.tones.front().amplitude);
     if (preflight_) scale_ = std::min(scale_, settings_.preflight.level);
   }
   const bool from_rest = excitation_.resting();

@@ -221,6 +221,7 @@ struct Trouble {
   int refusals = 0;           // so many times the drive cannot be connected to
   int reads_until_open = -1;  // of the door; below 0: stays closed
   bool open = false;          // the door, from the beginning
+  bool stays_on = false;      // cannot be armed
   std::string not_released;
 };
 
@@ -239,7 +240,10 @@ class TroubledDevice final : public Device, public Sensor {
   void check_may_arm() const override {
     if (trouble_.open) throw std::runtime_error{"door: the interlock is open"};
   }
-  void arm() override { device_->arm(); }
+  void arm() override {
+    if (trouble_.stays_on) throw std::runtime_error{"no answer to enable"};
+    device_->arm();
+  }
   std::string not_released() const override { return trouble_.not_released; }
   bool measures(std::size_t sensor) const override { return sensor == 0; }
   Actuator* actuator() noexcept override { return device_->actuator(); }
@@ -337,6 +341,17 @@ TEST_F(NightWithoutRetry, TriesOnce) {
   EXPECT_EQ(night(), 3);
   EXPECT_EQ(trouble.refusals, 0);
   EXPECT_EQ(detail(0), "no connection (Connection refused)");
+}
+
+TEST_F(NightWithoutRetry, EndsWhereADriveThatWasNotArmedMayBeOn) {
+  job("[[night.sweep]]\nrig = \"axis.toml\"\n"
+      "[[night.sweep]]\nname = \"other\"\nrig = \"axis.toml\"\n");
+  trouble.stays_on = true;
+  trouble.not_released = "the drive may still be on";
+  EXPECT_EQ(night(), 3);
+  EXPECT_EQ(detail(0), "no answer to enable; the drive may still be on");
+  EXPECT_EQ(summary().at("sweeps").at(1).at("outcome"), "not run");
+  EXPECT_THAT(detail(1), HasSubstr("a person has to look first, "));
 }
 
 // on_stop = "next" all along.

@@ -68,6 +68,13 @@ TEST_F(IncludedFiles, AreTheSameByWhateverLink) {
   const ConfiguredRig linked{(folder_ / "link/can-gimbal.toml").string(),
                              std::vector{can::can_driver()}};
   EXPECT_EQ(changed_include(run, linked.rig()), "");
+  const fs::path elsewhere = folder_ / "elsewhere";
+  fs::create_directories(elsewhere);
+  fs::copy(test::shipped("can-gimbal.toml"), elsewhere);
+  fs::copy(test::shipped("devices"), elsewhere / "devices");
+  const ConfiguredRig moved{(elsewhere / "can-gimbal.toml").string(),
+                            std::vector{can::can_driver()}};
+  EXPECT_EQ(changed_include(run, moved.rig()), "");
 }
 
 TEST_F(IncludedFiles, OfAFileThatDoesNotSayAreTakenAsTheyAre) {

@@ -123,10 +123,12 @@ TEST(RestOfASweep, HasThePreflightOfTheFirstDwell) {
   const Measured whole = run_from(plan, 0.0, {});
   RunnerSettings how;
   how.preflight = {.wanted = true, .min_phase_deg = -20.0, .max_phase_deg = 5.0};
-  for (const std::uint32_t kept : {3U, 8U, 11U}) {
+  const Measured fresh = run_from(plan, 0.0, {}, how);
+  for (const std::uint32_t kept : {1U, 3U, 8U, 9U, 10U, 11U}) {
     const Measured rest = run_from(plan, 0.0, first_of(whole, kept), how);
     EXPECT_FALSE(rest.outcome.trip.tripped()) << kept;
     ASSERT_EQ(rest.sink.preflights.size(), 1U);
+    EXPECT_NEAR(rest.sink.preflights[0].amplitude, fresh.sink.preflights[0].amplitude, 1e-12);
     EXPECT_EQ(rest.sink.preflights[0].frequency_hz, whole.sink.points[0].frequency_hz);
     ASSERT_EQ(rest.sink.points.size(), whole.sink.points.size() - kept);
     EXPECT_EQ(rest.sink.points[0].dwell, kept);
