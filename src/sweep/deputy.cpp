@@ -26,6 +26,7 @@ void Deputy::ask() noexcept {
   if (thread_.joinable()) {
     asked_.store(true, std::memory_order_release);
   } else {
+    const SystemCall time_stands_still;  // the job may allocate, as it may on its own thread
     job_();
   }
 }
