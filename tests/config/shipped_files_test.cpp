@@ -92,8 +92,7 @@ TEST_P(ShippedFile, AcceptsEveryCommentedKeyAtTheDefaultThatItShows) {
     if (commented && !alternative) {
       std::string edited = text;
       edited.erase(offset, 2);
-      const std::string path = testing::TempDir() + "/uncommented-" +
-                               std::filesystem::path{GetParam()}.filename().string();
+      const std::string path = test::own_file("uncommented.toml");
       test::write_text(path, edited);
       EXPECT_NO_THROW((cli::ConfiguredRig{path, drivers()}.rig().plan())) << line;
     }
@@ -160,7 +159,7 @@ TEST(EveryKeyThatIsRead, IsExplainedInTheShippedFiles) {
         bare_rig_with(ends,
                       "kind = \"state_space\"\noutputs = [\"y\"]\na = [[-1]]\nb = [1]\n"
                       "c = [[1]]\nd = [0]")}) {
-    const std::string path = testing::TempDir() + "/synthetic.toml";
+    const std::string path = test::own_file("synthetic.toml");
     test::write_text(path, text);
     read(path);
   }

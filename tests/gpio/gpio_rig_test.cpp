@@ -21,7 +21,7 @@ using testing::HasSubstr;
 
 struct Rig {
   explicit Rig(const std::string& text) {
-    const std::string path = testing::TempDir() + "/gpio-rig.toml";
+    const std::string path = test::own_file("gpio-rig.toml");
     test::write_text(path, text);
     configured.emplace(path, std::vector<DriverKit>{gpio_driver(
                                  [this] { return std::make_unique<test::FakeBank>(lines); })});
@@ -221,7 +221,7 @@ test::PartialFractions axis_in_closed_form() {
 
 struct Sweep {
   explicit Sweep(const std::string& actuator, const std::string& limits, double amplitude) {
-    const std::string path = testing::TempDir() + "/gpio-sweep.toml";
+    const std::string path = test::own_file("gpio-sweep.toml");
     test::write_text(
         path,
         "[loop]\nrate_hz = 1000\n[sweep]\nspacing = \"list\"\n"

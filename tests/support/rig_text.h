@@ -10,6 +10,7 @@
 
 #include "cli/configured_rig.h"
 #include "sim/sim_driver.h"
+#include "support/own_file.h"
 #include "support/virtual_run.h"
 
 namespace sinerig::test {
@@ -54,7 +55,7 @@ struct ConfiguredRun {
 
 // From the text of a rig file to the points, through everything but the recorder.
 inline ConfiguredRun run_text(const std::string& text) {
-  const std::string path = testing::TempDir() + "/rig.toml";
+  const std::string path = own_file("rig.toml");
   write_text(path, text);
   cli::ConfiguredRig configured{path, {sim::sim_driver()}};
   ConfiguredRun run;
