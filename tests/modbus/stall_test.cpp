@@ -170,80 +170,79 @@ void drive_on(Link& link, ModbusActuator& actuator, int exchanges) {
   }
 }
 
-class ModbusStall : public testing::TestWithParam<bool> {};
+// Of a drive that is armed and gets its set-points; true: it is read, too.
+class ModbusStall : public testing::TestWithParam<bool> {
+ protected:
+  void begin(const CommandSettings& settings) {
+    actuator_.emplace(link_, settings);
+    if (GetParam())
+      sensor_.emplace(link_, FeedbackSettings{number_at(34)}, "[sensor.position]", true);
+    link_.open();
+    actuator_->start();
+    actuator_->arm();
+    drive_on(link_, *actuator_, 5);
+  }
+
+  HeldDrive drive_;
+  Link link_{to(drive_)};
+  std::optional<ModbusActuator> actuator_;
+  std::optional<ModbusSensor> sensor_;
+};
 
 TEST_P(ModbusStall, LeavesFewSetPointsAndNoOrderToSwitchOnForADriveThatGoesOn) {
-  const bool with_sensor = GetParam();
-  HeldDrive drive;
-  Link link{to(drive)};
-  std::optional<ModbusActuator> actuator{std::in_place, link, command()};
-  std::optional<ModbusSensor> sensor;
-  if (with_sensor) sensor.emplace(link, FeedbackSettings{number_at(34)}, "[sensor.position]", true);
-  link.open();
-  actuator->start();
-  actuator->arm();
-  drive_on(link, *actuator, 5);
+  begin(command());
 
-  drive.hold();
-  drive_on(link, *actuator, 25);
-  actuator->release();
-  EXPECT_FALSE(actuator->released());
-  EXPECT_THAT(actuator->not_released(),
+  drive_.hold();
+  drive_on(link_, *actuator_, 25);
+  actuator_->release();
+  EXPECT_FALSE(actuator_->released());
+  EXPECT_THAT(actuator_->not_released(),
               AllOf(HasSubstr("has not taken neutral"), HasSubstr("no answer in time")));
-  link.reconnect();
-  EXPECT_THAT([&] { actuator->arm(); },
+  link_.reconnect();
+  EXPECT_THAT([&] { actuator_->arm(); },
               ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("neutral, before it is armed: "),
                                                       HasSubstr("no answer in time"))));
-  drive.let_go();
-  while (!actuator->released()) actuator->release();
+  drive_.let_go();
+  while (!actuator_->released()) actuator_->release();
 
   std::size_t stale = 0;
-  for (const auto& [address, value] : drive.writes()) {
+  for (const auto& [address, value] : drive_.writes()) {
     if (address == 0) {
       EXPECT_EQ(value, 0.0) << "switched on by what had waited";
     }
     if (address == 16 && value != 0.0) ++stale;
   }
   EXPECT_LE(stale, most_stale);
-  actuator->arm();
-  drive_on(link, *actuator, 5);
-  EXPECT_EQ(link.newest().fate, CommandFate::confirmed);
-  EXPECT_NE(link.last_failure(), "");
-  EXPECT_EQ(actuator->reason(), "") << "what has failed before is not what is wrong now";
+  actuator_->arm();
+  drive_on(link_, *actuator_, 5);
+  EXPECT_EQ(link_.newest().fate, CommandFate::confirmed);
+  EXPECT_NE(link_.last_failure(), "");
+  EXPECT_EQ(actuator_->reason(), "") << "what has failed before is not what is wrong now";
 }
 
 // Its age is what ends a sweep, and what it is asked before it gets set-points again moves nothing:
 // the sine may be far from neutral.
 TEST_P(ModbusStall, IsNoFaultBeforeItIsTooOldAndNoNeutral) {
-  const bool with_sensor = GetParam();
-  HeldDrive drive;
-  Link link{to(drive)};
   CommandSettings settings = command();
   settings.max_age_ns = 100 * generous_ns;
-  std::optional<ModbusActuator> actuator{std::in_place, link, settings};
-  std::optional<ModbusSensor> sensor;
-  if (with_sensor) sensor.emplace(link, FeedbackSettings{number_at(34)}, "[sensor.position]", true);
-  link.open();
-  actuator->start();
-  actuator->arm();
-  drive_on(link, *actuator, 5);
+  begin(settings);
 
-  drive.hold();
-  while (!link.silent()) {
-    actuator->write(1.0);
+  drive_.hold();
+  while (!link_.silent()) {
+    actuator_->write(1.0);
     std::this_thread::yield();
   }
   for (int n = 0; n < 1000; ++n) {
-    const Fault fault = actuator->write(1.0).fault;
+    const Fault fault = actuator_->write(1.0).fault;
     ASSERT_TRUE(fault == Fault::none || fault == Fault::stale) << to_string(fault);
     std::this_thread::yield();
   }
-  drive.let_go();
-  while (link.silent() || link.newest().fate != CommandFate::confirmed) {
-    actuator->write(1.0);
+  drive_.let_go();
+  while (link_.silent() || link_.newest().fate != CommandFate::confirmed) {
+    actuator_->write(1.0);
     std::this_thread::yield();
   }
-  for (const auto& [address, value] : drive.writes()) {
+  for (const auto& [address, value] : drive_.writes()) {
     if (address == 16) {
       EXPECT_NE(value, 0.0);
     }
