@@ -29,13 +29,12 @@ class Reader {
  public:
   explicit Reader(const std::string& path) : table_{path} {}
 
-  CsvResponse read(const std::string& path) {
+  CsvResponse read() {
     while (table_.next()) {
       const std::string status = table_.text("status");
       if (status.empty() || status == "good" || status == "imported") add_point();
     }
-    if (csv_.response.empty())
-      throw SweepFileError(path + ": holds no points; wanted lines of freq_hz,re,im[,std]");
+    if (csv_.response.empty()) table_.refuse_empty();
     return csv_;
   }
 
@@ -130,7 +129,7 @@ void check_polar_unit(const std::string& path, const identify::Response& respons
 }  // namespace
 
 CsvResponse read_csv_response(const std::string& path, bool trust_units) {
-  CsvResponse csv = Reader{path}.read(path);
+  CsvResponse csv = Reader{path}.read();
   if (!trust_units) {
     check_scatter_unit(path, csv.response);
     check_polar_unit(path, csv.response);

@@ -4,22 +4,13 @@
 
 namespace sinerig::cli {
 
-namespace {
-
-std::string line_of(const std::string& path, const std::string& digest) {
-  std::string line = digest;
-  line += ", ";
-  line += path;
-  return line;
-}
-
-}  // namespace
-
 std::string included_text(const config::Rig& rig) {
   std::string text;
   for (const auto& [path, digest] : rig.file->included()) {
     if (!text.empty()) text += '\n';
-    text += line_of(path, digest);
+    text += digest;
+    text += ", ";
+    text += path;
   }
   return text;
 }

@@ -67,13 +67,10 @@ class Night {
     for (const NightTask& task : tasks_) {
       const std::unique_ptr<ConfiguredRig> configured = configured_rig(task, drivers_);
       of_sweep(*task.sweep, [&] { return configured->rig().plan(); });
-      const TaskState state = state_of(task);
-      if (state != TaskState::not_begun) {
-        refuse_changed_include(record::read_sweep(task.sweep_file), configured->rig(),
-                               task.sweep_file);
-      }
+      const std::optional<record::StoredRun> run = begun_run(task);
+      if (run) refuse_changed_include(*run, configured->rig(), task.sweep_file);
       included_[task.sweep_file] = included_text(configured->rig());
-      if (state != TaskState::done) require_rights(task, configured->rig());
+      if (state_of(run) != TaskState::done) require_rights(task, configured->rig());
     }
   }
 
@@ -216,10 +213,10 @@ int Night::sweep_patiently(const NightTask& task, TaskState state) {
 
 // Runs what is left of a task; the exit code of a run.
 int Night::attend(const NightTask& task, std::size_t number, const NightFolder& folder) {
-  const TaskState state = state_of(task);
+  const std::optional<record::StoredRun> before = begun_run(task);
+  const TaskState state = state_of(before);
   if (state == TaskState::done) return exit_done;
-  if (state == TaskState::stopped && !job_.stop_on_stop &&
-      to_be_looked_at(record::read_sweep(task.sweep_file)).empty()) {
+  if (state == TaskState::stopped && !job_.stop_on_stop && to_be_looked_at(*before).empty()) {
     return exit_stopped;  // it had its chance
   }
   if (state == TaskState::not_begun && !wait_for(task, folder)) return exit_interrupted;

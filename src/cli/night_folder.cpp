@@ -73,17 +73,20 @@ std::string NightFolder::path(const std::string& name) const {
   return (fs::path{folder_} / name).string();
 }
 
-TaskState state_of(const NightTask& task) {
-  if (!fs::exists(task.sweep_file) || !record::is_begun(task.sweep_file)) {
-    return TaskState::not_begun;
-  }
-  const record::StoredRun run = record::read_sweep(task.sweep_file);
+std::optional<record::StoredRun> begun_run(const NightTask& task) {
+  if (!fs::exists(task.sweep_file) || !record::is_begun(task.sweep_file)) return std::nullopt;
+  record::StoredRun run = record::read_sweep(task.sweep_file);
   if (run.fact("rig_text") != task.rig_text) {
     throw config::ConfigError(
         task.sweep_file + ": was made from another rig file or other values than " +
         task.sweep->rig + " now gives; give the night another folder, or put them back");
   }
-  const std::string outcome = run.fact("outcome");
+  return run;
+}
+
+TaskState state_of(const std::optional<record::StoredRun>& run) {
+  if (!run) return TaskState::not_begun;
+  const std::string outcome = run->fact("outcome");
   if (outcome == "done") return TaskState::done;
   return outcome == "stopped" ? TaskState::stopped : TaskState::unfinished;
 }
@@ -109,9 +112,10 @@ namespace {
 // What the sweep file says; `first` is the first repeat that has points, with which it is compared.
 void read_row(const NightTask& task, const NightJob& job, std::vector<report::LabelledRun>& first,
               report::NightRow& row) {
-  if (state_of(task) == TaskState::not_begun) return;
+  std::optional<record::StoredRun> stored = begun_run(task);
+  if (!stored) return;
   report::LabelledRun run{.label = fs::path{task.sweep_file}.stem().string(),
-                          .run = record::read_sweep(task.sweep_file)};
+                          .run = std::move(*stored)};
   row.started_utc = run.run.fact("started_utc");
   row.outcome = run.run.fact("outcome").empty() ? "not finished" : run.run.fact("outcome");
   row.detail = run.run.fact("outcome_detail");

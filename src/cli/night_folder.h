@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/night_job.h"
 #include "cli/wall_time.h"
 #include "record/file_lock.h"
+#include "record/sweep_reader.h"
 #include "report/night_summary.h"
 
 namespace sinerig::cli {
@@ -31,9 +33,12 @@ class NightFolder {
 
 enum class TaskState { not_begun, unfinished, stopped, done };
 
-// Where a task stands by its sweep file. Throws config::ConfigError where that was made from
-// another rig file, record::SweepFileError where it cannot be read.
-TaskState state_of(const NightTask& task);
+// What a task's sweep file holds; nothing where no run of it was begun. Throws config::ConfigError
+// where it was made from another rig file, record::SweepFileError where it cannot be read.
+std::optional<record::StoredRun> begun_run(const NightTask& task);
+
+// Where a task stands by that.
+TaskState state_of(const std::optional<record::StoredRun>& run);
 
 // Why a person has to look before anything is armed again, after the last part of a run: it went on
 // until an interlock opened, or its actuator has not taken its release. Empty where nobody has to.

@@ -60,8 +60,7 @@ ImportedResponse read_csv(const std::string& path) {
     if (!table.has("input")) read_channel(remark, "input:", response.input);
     if (!table.has("output")) read_channel(remark, "output:", response.output);
   }
-  if (response.points.empty())
-    throw SweepFileError(path + ": holds no points; wanted lines of freq_hz,re,im[,std]");
+  if (response.points.empty()) table.refuse_empty();
   return response;
 }
 

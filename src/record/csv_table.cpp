@@ -84,6 +84,10 @@ double CsvTable::number(const std::string& column) const {
   return std::strtod(value.c_str(), nullptr);
 }
 
+void CsvTable::refuse_empty() const {
+  throw SweepFileError(lines_.path() + ": holds no points; wanted lines of freq_hz,re,im[,std]");
+}
+
 double CsvTable::frequency_hz() const {
   return has("freq_hz") ? number("freq_hz") : number("omega_rad_s") / turn;
 }

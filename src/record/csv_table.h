@@ -23,6 +23,8 @@ class CsvLines {
   // What stands behind the # of the lines passed so far.
   const std::vector<std::string>& remarks() const { return remarks_; }
 
+  const std::string& path() const { return path_; }
+
   // Throws SweepFileError: file, line and what is wrong.
   [[noreturn]] void refuse(const std::string& what) const;
 
@@ -62,6 +64,9 @@ class CsvTable {
   std::vector<std::string> needed_columns() const;
 
   const CsvLines& lines() const { return lines_; }
+
+  // Throws SweepFileError for a file without a point.
+  [[noreturn]] void refuse_empty() const;
 
  private:
   void name_columns(const std::vector<std::string>& names, bool headed);
